@@ -2,6 +2,8 @@
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
+use crate::colour::{LUMINANCE, srgb_to_linear};
+
 /// Index of a model in the list that a session and the renderer were both made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ModelId(pub u16);
@@ -62,6 +64,21 @@ pub struct Texture {
     pub height: u32,
     /// R, G, B, A bytes.
     pub rgba: Vec<u8>,
+}
+
+impl Texture {
+    /// Mean luminance of what is not transparent, linear, of some thousand pixels.
+    fn reflectance(&self) -> f64 {
+        const LOOKED_AT: usize = 4096;
+        let step = (self.rgba.len() / 4 / LOOKED_AT).max(1);
+        let pixels = self.rgba.chunks_exact(4).step_by(step).map(|pixel| {
+            let [r, g, b, a] = [0, 1, 2, 3].map(|i| f32::from(pixel[i]) / 255.0);
+            let linear = Vec3::new(srgb_to_linear(r), srgb_to_linear(g), srgb_to_linear(b));
+            (f64::from(linear.dot(LUMINANCE) * a), f64::from(a))
+        });
+        let (light, cover) = pixels.fold((0.0, 0.0), |(light, cover), (l, a)| (light + l, cover + a));
+        if cover > 0.0 { light / cover } else { 0.0 }
+    }
 }
 
 /// Whether a model has a shape or is a picture that turns towards the camera.
@@ -127,6 +144,22 @@ impl Model {
     /// Highest point above the waterline, metres.
     pub fn height_m(&self) -> f64 {
         f64::from(self.max.z)
+    }
+
+    /// Share of light that its surface throws back in the mean over all triangles, 0 to 1; of a textured one with that of the whole texture.
+    pub fn reflectance(&self) -> f64 {
+        let corner = |i: &u32| self.vertices.get(usize::try_from(*i).ok()?);
+        let of_triangle = |triangle: &[u32]| {
+            let corners = [corner(triangle.first()?)?, corner(triangle.get(1)?)?, corner(triangle.get(2)?)?];
+            let [a, b, c] = corners.map(|corner| corner.position);
+            let albedo = corners.iter().map(|corner| corner.albedo.dot(LUMINANCE)).sum::<f32>() / 3.0;
+            Some((f64::from((b - a).cross(c - a).length()), f64::from(albedo)))
+        };
+        let triangles = self.indices.chunks_exact(3).filter_map(of_triangle);
+        let (area, thrown) =
+            triangles.fold((0.0, 0.0), |(sum, all), (area, albedo)| (sum + area, all + area * albedo));
+        let surface = if area > 0.0 { thrown / area } else { 0.0 };
+        (surface * self.texture.as_ref().map_or(1.0, Texture::reflectance)).clamp(0.0, 1.0)
     }
 
     /// Radius about the boat's origin that holds every corner, metres.

@@ -187,7 +187,10 @@ impl Session {
                 ..*edge
             }),
             Event::Ship(sample) => self.estimator.ship(sample),
-            Event::ShipFix(fix) => self.estimator.ship_fix(fix),
+            Event::ShipFix(fix) => {
+                self.estimator.ship_fix(fix);
+                self.world.ship_fix(fix);
+            }
             Event::Mark(mark) => self.estimator.mark(mark),
             Event::Act(act) => self.world.act(*act),
             Event::Fault(change) => {

@@ -1,24 +1,23 @@
 //! Fire and smoke of boats that burn: puffs, each a function of its number and the time, so that any frame of any pace shows the same.
 //!
-//! A fire on fuel grows with the square of time (the ultra-fast curve of NFPA 92) and stops growing at a megawatt. Flames reach as high as
+//! Its heat is the world's ([`fire_heat_kw`]). Flames reach as high as
 //! Heskestad (1984) gives. Smoke rises as a plume that wind bends over (Briggs 1975), widens with its height, and hides what is behind it by the
 //! soot that burns off (yield of fuels: Tewarson 2002; specific extinction: Mulholland and Croarkin 2000).
 
 use glam::{DVec2, DVec3, Vec3};
 
 use super::scene::RoundView;
-use crate::{chance::drawn, physics::haze_share};
+use crate::{
+    chance::drawn,
+    physics::haze_share,
+    world::boats::{FIRE_CANDELA_KW, fire_heat_kw},
+};
 
 /// Most puffs of a boat in one scene.
 pub const PUFFS_A_BOAT: usize = SMOKE_PUFFS + FLAME_PUFFS;
 /// Most boats whose fires are drawn; of more, the first of the scenario.
 pub const FIRES_SEEN_MAX: usize = 4;
 
-/// Heat of an outboard and its fuel as it catches fire, and as it burns fully, kW.
-const HEAT_LEAST_KW: f64 = 150.0;
-const HEAT_MOST_KW: f64 = 1000.0;
-/// Growth of the heat, kW/s^2.
-const GROWTH_KW_S2: f64 = 0.1876;
 /// Diameter of the fire, metres.
 const DIAMETER_M: f64 = 0.8;
 /// Heat of petrol, kJ/g, its yield of soot, g/g, and what soot takes out of light, m^2/g.
@@ -45,8 +44,6 @@ const FLAME_CD_M2: f64 = 12_000.0;
 const FLAME: Vec3 = Vec3::new(2.1, 0.78, 0.14);
 /// Share of light that a thick cloud of soot throws back.
 pub const SOOT_ALBEDO: f64 = 0.13;
-/// Luminous intensity of a fire for each kW, cd: that of 160 lm to all sides, as a candle gives 12 lm of 80 W.
-const CANDELA_KW: f64 = 12.7;
 
 /// A boat that burns.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,8 +65,7 @@ pub struct Burning {
 impl Burning {
     /// Heat at a time, kW; 0 before it burns.
     pub fn heat_kw(&self, time_s: f64) -> f64 {
-        let since_s = time_s - self.since_s;
-        if since_s < 0.0 { 0.0 } else { (HEAT_LEAST_KW + GROWTH_KW_S2 * since_s * since_s).min(HEAT_MOST_KW) }
+        fire_heat_kw(time_s - self.since_s)
     }
 
     /// Height of flames at a time, metres (Heskestad 1984).
@@ -84,7 +80,7 @@ impl Burning {
         let tenths = (time_s * 10.0).max(0.0);
         let flicker =
             moment(tenths.floor()) * (1.0 - tenths.fract()) + moment(tenths.floor() + 1.0) * tenths.fract();
-        CANDELA_KW * self.heat_kw(time_s) * (1.0 + 0.4 * flicker)
+        FIRE_CANDELA_KW * self.heat_kw(time_s) * (1.0 + 0.4 * flicker)
     }
 
     /// Colour of its light, of luminance 1.
@@ -154,7 +150,7 @@ impl Burning {
 
     /// Radiance of smoke so far from the flames, white in the picture being 1: what a matt cloud throws back of their illuminance.
     fn lit_by_flames(&self, heat_kw: f64, distance_m: f64) -> f64 {
-        let lux = CANDELA_KW * heat_kw / (distance_m * distance_m);
+        let lux = FIRE_CANDELA_KW * heat_kw / (distance_m * distance_m);
         SOOT_ALBEDO * lux / std::f64::consts::PI / self.white_cd_m2.max(1e-6)
     }
 
@@ -213,10 +209,10 @@ mod tests {
     fn a_fire_is_as_bright_as_its_heat_and_never_of_no_number() {
         let burning = burning(DVec2::ZERO);
         assert_eq!(burning.heat_kw(4.0), 0.0);
-        assert!((burning.heat_kw(5.0), burning.heat_kw(500.0)) == (HEAT_LEAST_KW, HEAT_MOST_KW));
+        assert!((burning.heat_kw(5.0), burning.heat_kw(500.0)) == (150.0, 1000.0));
         let all: Vec<f64> = (0..2000).map(|i| burning.candela(100.0 + f64::from(i) * 0.013)).collect();
         let mean = all.iter().sum::<f64>() / all.len() as f64;
-        assert!((mean / (CANDELA_KW * HEAT_MOST_KW) - 1.0).abs() < 0.03);
+        assert!((mean / (FIRE_CANDELA_KW * 1000.0) - 1.0).abs() < 0.03);
         for view in puffs(&burning, 30.0) {
             let (RoundView::Smoke { at, .. } | RoundView::Flame { at, .. }) = view else {
                 panic!("{view:?}")

@@ -6,7 +6,12 @@ use rand_pcg::Pcg64;
 
 use crate::{
     side::Side,
-    world::{RunningWorld, exercise::STOPPED_M_S, fleet::Fleet},
+    world::{
+        RunningWorld,
+        exercise::STOPPED_M_S,
+        fleet::Fleet,
+        seeing::threshold::{UNALERTED, chance},
+    },
 };
 
 /// Metres in a nautical mile.
@@ -46,11 +51,14 @@ pub(super) struct Eye {
 impl Eye {
     /// All boats that can be seen from here.
     pub fn sees(&self, running: &RunningWorld) -> Vec<Sighted> {
-        let boats: Vec<Sighted> = (0..running.fleet.len()).filter_map(|b| self.sight(running, b)).collect();
+        let seen = running.fleet.seen_from(self.at, running.now);
+        let boats: Vec<Sighted> =
+            seen.iter().enumerate().filter_map(|(boat, times)| self.sight(running, boat, *times)).collect();
         boats.iter().filter(|boat| !self.is_hidden(boat, &boats, &running.fleet)).copied().collect()
     }
 
-    fn sight(&self, running: &RunningWorld, boat: usize) -> Option<Sighted> {
+    /// A boat that has so many times the contrast that somebody needs who looks at it.
+    fn sight(&self, running: &RunningWorld, boat: usize, times_threshold: f64) -> Option<Sighted> {
         let RunningWorld { fleet, now, start, .. } = running;
         let at = fleet.middle(boat, *now).filter(|_| fleet.swims(boat, *now))?;
         let history = fleet.history(boat)?;
@@ -62,7 +70,7 @@ impl Eye {
             boat,
             at,
             velocity,
-            found_per_s: self.found_per_s(range_m, length_m),
+            found_per_s: self.found_per_s(range_m, length_m) * chance(times_threshold / UNALERTED),
             is_recognised: fleet.height_m(boat) / range_m.max(1.0) > RECOGNISED,
             side: fleet.side(boat)?,
             is_over,

@@ -1,5 +1,7 @@
 //! The boats of a session: where each is at any time, given what has struck it.
 
+mod sight;
+
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
@@ -17,6 +19,7 @@ use crate::{
         contact::Capsule,
         scenario::{BoatSpec, Scenario, Side},
         searchlight::{Beam, Searchlight},
+        seeing::{SceneLight, Seeing, SeeingLog},
         waves::{WaterLevel, WaveField},
     },
 };
@@ -138,6 +141,11 @@ pub struct Fleet {
     /// Orders of the person who drives boats, each from those seconds on.
     driven: Vec<(f64, Orders)>,
     searchlight: Option<Searchlight>,
+    seeing: SeeingLog,
+    /// Height of the gun over the water, metres.
+    gun_m: f64,
+    /// Share of light that each model throws back.
+    reflectances: Vec<f64>,
 }
 
 impl Fleet {
@@ -154,7 +162,33 @@ impl Fleet {
         };
         let boats = vessels.into_iter().map(boat).collect();
         let (struck, driven) = (Vec::new(), Vec::new());
-        Self { boats, models, waves, start, followed: start, struck, driven, searchlight: None }
+        let reflectances = models.iter().map(Model::reflectance).collect();
+        Self {
+            boats,
+            models,
+            waves,
+            start,
+            followed: start,
+            struck,
+            driven,
+            searchlight: None,
+            seeing: SeeingLog::steady(Seeing::clear_day()),
+            gun_m: Self::GUN_M,
+            reflectances,
+        }
+    }
+
+    /// Height of a gun where no scenario gives one, metres.
+    const GUN_M: f64 = 8.0;
+
+    /// The same in that light and air, about a gun so high over the water, metres.
+    pub fn with_seeing(self, seeing: Seeing, gun_m: f64) -> Self {
+        Self { seeing: SeeingLog::steady(seeing), gun_m, ..self }
+    }
+
+    /// Light and air are these from `time` on. Boats have not been followed that far.
+    pub fn see_by(&mut self, time: Time, seeing: Seeing) {
+        self.seeing.note(time.secs_since(self.start), seeing);
     }
 
     /// The same where the gun has a searchlight.
@@ -176,7 +210,9 @@ impl Fleet {
         boat_models: &[ModelId],
         start: Time,
     ) -> Self {
+        let seeing = SceneLight::new(&scenario.daylight, scenario.wind.length()).at(start);
         Self::new(Vessel::of_scenario(scenario, boat_models), models, scenario.wave_field(), start)
+            .with_seeing(seeing, scenario.eye_height_m)
     }
 
     /// Follows all boats up to `time`.
@@ -280,7 +316,7 @@ impl Fleet {
             hit: me.history.first_hit_s().is_some_and(|s| s <= time_s),
             neighbour_hit: self.struck.iter().any(near),
             lit: !hidden && self.is_in_beam(boat, at, time_s),
-            sees_gun: !hidden,
+            sees_gun: !hidden && self.sees_gun(boat, at, time_s),
         }
     }
 

@@ -82,11 +82,9 @@ impl Searchlight {
     pub fn illuminance(&self, beam: &Beam, at: DVec3) -> f64 {
         /// Nearer than this it is no point, metres.
         const NEAREST_M: f64 = 1.0;
-        let ray = at - beam.lamp;
-        let range_m = ray.length().max(NEAREST_M);
-        // At the lamp itself there is no direction, and all of it.
-        let off = ray.cross(beam.axis).length().atan2(ray.dot(beam.axis));
-        self.spec.candela_at(off) * (-self.extinction_per_m * range_m).exp() / (range_m * range_m)
+        let range_m = at.distance(beam.lamp).max(NEAREST_M);
+        self.spec.candela_at(off_axis(beam, at)) * (-self.extinction_per_m * range_m).exp()
+            / (range_m * range_m)
     }
 
     /// The beam is this from `time_s` on.
@@ -97,12 +95,31 @@ impl Searchlight {
         self.shone.push_back((time_s, beam));
     }
 
+    /// The beam at a time, seconds since the start; `None` while it is off.
+    fn beam_at(&self, time_s: f64) -> Option<&Beam> {
+        self.shone.iter().rev().find(|(since_s, _)| *since_s <= time_s)?.1.as_ref()
+    }
+
+    /// Illuminance by it at `at`, of a surface that faces it, lux.
+    pub fn lux(&self, at: DVec3, time_s: f64) -> f64 {
+        self.beam_at(time_s).map_or(0.0, |beam| self.illuminance(beam, at))
+    }
+
+    /// Intensity by which somebody at `at` sees it shine, candela.
+    pub fn candela_towards(&self, at: DVec3, time_s: f64) -> f64 {
+        self.beam_at(time_s).map_or(0.0, |beam| self.spec.candela_at(off_axis(beam, at)))
+    }
+
     /// Tests whether it lights what is at `at`: it is no darker there than by the sky, and bright enough to be noticed.
     pub fn lights(&self, at: DVec3, time_s: f64) -> bool {
-        let newest = self.shone.iter().rev().find(|(since_s, _)| *since_s <= time_s);
-        let beam = newest.and_then(|(_, beam)| beam.as_ref());
-        beam.is_some_and(|beam| self.illuminance(beam, at) >= self.lit_lux)
+        self.beam_at(time_s).is_some_and(|beam| self.illuminance(beam, at) >= self.lit_lux)
     }
+}
+
+/// Angle between a beam's axis and the line to `at`, radians; none at the lamp itself.
+fn off_axis(beam: &Beam, at: DVec3) -> f64 {
+    let ray = at - beam.lamp;
+    ray.cross(beam.axis).length().atan2(ray.dot(beam.axis))
 }
 
 /// A searchlight's switch.

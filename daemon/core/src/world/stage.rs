@@ -13,6 +13,7 @@ use super::{
     score::{AIM_TREND_S, BoreSample, NotScored, Outcome, ShotRecord},
     sea_change::{SeaChange, conditions_of},
     searchlight::{Beam, LightSwitch, Searchlight, SearchlightSpec},
+    seeing::{SceneLight, threshold},
     waves::WaveField,
     weapon::{Stoppages, Weapon, WeaponState},
 };
@@ -20,7 +21,7 @@ use crate::{
     act::{Act, DriveOrder, TraineeAct},
     daylight::Daylight,
     estimate::sea::SeaConditions,
-    event::TriggerEdge,
+    event::{ShipFix, TriggerEdge},
     model::{Model, ModelId, Zone},
     time::Time,
 };
@@ -92,6 +93,9 @@ pub struct World {
     driving: Vec<(Time, DriveOrder)>,
     searchlight: Option<LightSwitch>,
     daylight: Daylight,
+    light: SceneLight,
+    /// Height of the gunner's eye over the water, metres.
+    eye_m: f64,
 }
 
 /// Boats and rounds, from the first picture on.
@@ -136,17 +140,18 @@ impl RunningWorld {
 
     /// The event that a round was fired.
     fn fired(&self, shot: u64, time: Time, aim: &BoreAim) -> ExerciseEvent {
-        let boats = self.watched(Some(aim));
+        let boats = self.watched(Some(aim), aim.muzzle);
         let at = pointed_at(&boats).and_then(|boat| boats.get(boat));
         let (boat, range_m) = (at.map(|b| b.name.to_owned()), at.map(|b| b.range_m));
         ExerciseEvent { time, fact: ExerciseFact::Fired { shot, boat, range_m } }
     }
 
-    /// All boats, for whoever watches the exercise, while the barrel points as `aim` says, if that is known.
-    fn watched(&self, aim: Option<&BoreAim>) -> Vec<WatchedBoat<'_>> {
+    /// All boats, for whoever watches the exercise, as an eye at `watcher` has them, while the barrel points as `aim` says, if that is known.
+    fn watched(&self, aim: Option<&BoreAim>, watcher: DVec3) -> Vec<WatchedBoat<'_>> {
         let aim = aim.filter(|aim| aim.unscored.is_none());
         let Self { fleet, now, .. } = self;
         let eye = aim.map_or(DVec3::ZERO, |aim| aim.muzzle);
+        let seen = fleet.seen_from(watcher, *now);
         let watched = |boat: usize| {
             let at = fleet.middle(boat, *now)?;
             let speed_m_s = fleet.history(boat)?.state(now.secs_since(self.start)).velocity().length();
@@ -158,7 +163,7 @@ impl RunningWorld {
                 off_bore: aim
                     .filter(|_| fleet.swims(boat, *now))
                     .map(|aim| aim.bore.angle_between(at - aim.muzzle)),
-                height_m: fleet.height_m(boat),
+                seen: threshold::chance(seen.get(boat).copied().unwrap_or(0.0)),
                 struck: fleet.first_hit(boat).filter(|struck| struck <= now),
                 is_lit: fleet.is_lit(boat, *now),
                 gave_up: fleet.gave_up(boat),
@@ -198,7 +203,7 @@ impl World {
             waves: scenario.wave_field(),
             sea_change: SeaChange::new(&scenario.waves),
             running: None,
-            watch: ExerciseWatch::new(scenario.exercise.clone(), scenario.daylight.visibility_m),
+            watch: ExerciseWatch::new(scenario.exercise.clone()),
             events: Vec::new(),
             message: None,
             score: Score::default(),
@@ -207,6 +212,8 @@ impl World {
             driving: Vec::new(),
             searchlight: scenario.searchlight.map(LightSwitch::new),
             daylight: scenario.daylight,
+            light: SceneLight::new(&scenario.daylight, scenario.wind.length()),
+            eye_m: scenario.eye_height_m,
         }
     }
 
@@ -228,6 +235,11 @@ impl World {
     /// Takes in an edge of the trigger.
     pub fn trigger(&mut self, edge: TriggerEdge) {
         self.weapon.edge(edge);
+    }
+
+    /// Takes in place and time that the ship's instruments told.
+    pub fn ship_fix(&mut self, fix: &ShipFix) {
+        self.light.fix(fix);
     }
 
     /// Takes in an act of the trainee.
@@ -269,6 +281,9 @@ impl World {
             // An order that comes late, or with a time of its own, counts from about now on.
             let time = time.clamp(running.now.plus_secs(-DRIVEN_LATE_S).min(now), now);
             running.fleet.drive(order, time);
+        }
+        while let Some((time, seeing)) = self.light.next_note(running.start, now) {
+            running.fleet.see_by(time, seeing);
         }
         self.shine(&mut running, now, &mut aim);
         let was_stopped = self.weapon.state() == WeaponState::Stoppage;
@@ -329,7 +344,7 @@ impl World {
     fn watch_exercise(&mut self, running: &mut RunningWorld, aim: BoreAim) {
         running.note_ends(&mut self.events);
         self.count_fragments();
-        let boats = running.watched(Some(&aim));
+        let boats = running.watched(Some(&aim), DVec3::Z * self.eye_m);
         let orders = self.watch.follow(running.now, &boats, self.weapon.rounds_in_all(), &mut self.events);
         for boat in orders.warned {
             running.fleet.warn(boat, running.now);
@@ -369,7 +384,8 @@ impl World {
 
     fn begin(&self, start: Time) -> RunningWorld {
         let fleet = Fleet::new(self.vessels.clone(), Arc::clone(&self.models), self.waves.clone(), start)
-            .with_searchlight(self.searchlight.as_ref().map(|s| Searchlight::new(s.spec, &self.daylight)));
+            .with_searchlight(self.searchlight.as_ref().map(|s| Searchlight::new(s.spec, &self.daylight)))
+            .with_seeing(self.light.clone().at(start), self.eye_m);
         let rounds = Rounds::new(self.ammunition.clone(), self.waves.clone(), start);
         let fired = VecDeque::with_capacity(FIRED_KEPT + 1);
         RunningWorld { start, now: start, fleet, rounds, flares: Vec::new(), fired }
@@ -379,7 +395,7 @@ impl World {
     pub fn finish(&mut self, records: &mut Vec<ShotRecord>) {
         self.events.clear();
         if let Some(running) = &mut self.running {
-            let boats = running.watched(None);
+            let boats = running.watched(None, DVec3::Z * self.eye_m);
             let mut ended = Vec::new();
             self.watch.finish(running.now, &boats, self.weapon.rounds_in_all(), &mut ended);
             let RunningWorld { start, now, fleet, rounds, .. } = running;

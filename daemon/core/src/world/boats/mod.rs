@@ -5,6 +5,7 @@ mod course;
 mod crew;
 mod crewed;
 mod drive;
+mod fire;
 mod floating;
 mod flooding;
 mod grid;
@@ -22,6 +23,7 @@ pub use crewed::StepView;
 pub use drive::{
     Craft, DriveRates, DriveState, HullRunning, Orders, PlaningSurface, Propulsor, Running, Surroundings,
 };
+pub use fire::{FIRE_CANDELA_KW, fire_heat_kw};
 pub use floating::{Floating, WayAttitude, facing, quasi_static};
 pub(crate) use grid::{seconds as step_seconds, step_after};
 pub use history::{BoatHistory, HISTORY_S};

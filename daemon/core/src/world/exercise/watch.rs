@@ -8,7 +8,7 @@ use crate::{
     act::{Act, TraineeAct},
     side::Side,
     time::Time,
-    world::flare::FlareSpec,
+    world::{flare::FlareSpec, seeing::threshold::SEEN},
 };
 
 /// A barrel that points no further off a boat than this points at it, radians.
@@ -21,12 +21,6 @@ pub const STOPPED_M_S: f64 = 1.0;
 const OPENS_M_S: f64 = 2.0;
 /// How long it has to, seconds.
 const OPENED_S: f64 = 3.0;
-/// Least angle under which a hull can be seen, radians: two minutes of arc (1 is the eye's limit for a line).
-const SEEN: f64 = 2.0 / 60.0 * std::f64::consts::PI / 180.0;
-/// Share of the meteorological visibility at which a grey hull is still told from the sky behind it: contrast falls with exp(-3.912 r / V)
-/// (Koschmieder 1924), and a boat has .3 at hand where .05 is needed.
-const SEEN_IN_HAZE: f64 = 0.46;
-
 /// A boat as the watch sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct WatchedBoat<'a> {
@@ -40,8 +34,8 @@ pub struct WatchedBoat<'a> {
     pub speed_m_s: f64,
     /// Angle between the barrel and the boat's middle, radians; `None` while it is not known where the barrel points.
     pub off_bore: Option<f64>,
-    /// Height that shows over the water, metres.
-    pub height_m: f64,
+    /// Chance that a glimpse shows it to somebody who looks at it, 0 to 1.
+    pub seen: f64,
     /// When it was first struck.
     pub struck: Option<Time>,
     /// The searchlight is on it.
@@ -77,7 +71,6 @@ struct BoatNotes {
 #[derive(Clone, Debug)]
 pub struct ExerciseWatch {
     spec: ExerciseSpec,
-    visibility_m: f64,
     boats: Vec<BoatNotes>,
     rules: Engagement,
     happened: Vec<bool>,
@@ -98,13 +91,12 @@ pub struct WatchOrders {
 }
 
 impl ExerciseWatch {
-    /// For an exercise in that visibility.
-    pub fn new(spec: ExerciseSpec, visibility_m: f64) -> Self {
+    /// For an exercise that has not begun.
+    pub fn new(spec: ExerciseSpec) -> Self {
         Self {
             rules: spec.rules.unwrap_or_default(),
             happened: vec![false; spec.happenings.len()],
             spec,
-            visibility_m,
             boats: Vec::new(),
             acts: Vec::new(),
             begun: None,
@@ -159,7 +151,7 @@ impl ExerciseWatch {
         self.boats.resize_with(boats.len(), BoatNotes::default);
         let mut orders = WatchOrders::default();
         for (boat, notes) in boats.iter().zip(&mut self.boats) {
-            notes.look(boat, time, (&self.spec, self.visibility_m), &mut note);
+            notes.look(boat, time, &self.spec, &mut note);
         }
         let mut threats =
             boats.iter().zip(&self.boats).filter(|(boat, _)| boat.side == Side::Hostile).peekable();
@@ -249,13 +241,12 @@ impl BoatNotes {
         &mut self,
         boat: &WatchedBoat<'_>,
         time: Time,
-        (spec, visibility_m): (&ExerciseSpec, f64),
+        spec: &ExerciseSpec,
         note: &mut impl FnMut(ExerciseFact),
     ) {
         let (name, range_m) = (|| boat.name.to_owned(), boat.range_m);
         self.nearest_m = Some(self.nearest_m.map_or(range_m, |nearest| nearest.min(range_m)));
-        let seen_m = (boat.height_m / SEEN).min(SEEN_IN_HAZE * visibility_m);
-        if !self.in_view && range_m < seen_m {
+        if !self.in_view && boat.seen >= SEEN {
             self.in_view = true;
             note(ExerciseFact::InView { boat: name(), side: boat.side, range_m });
             for call in spec.calls.iter().filter(|call| call.about.covers(boat.name, boat.side)) {

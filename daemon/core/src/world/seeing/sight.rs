@@ -56,6 +56,11 @@ pub struct Seeing {
 }
 
 impl Seeing {
+    /// A clear day, where no scenario says otherwise.
+    pub fn clear_day() -> Self {
+        Self { ambient: Ambient::new(DVec3::Z, 1.0, None, 5.0), visibility_m: 20_000.0 }
+    }
+
     /// How many times its contrast, or its light, is what half of the glimpses of an alert watcher at `eye` need who looks at it; `at` is its
     /// waterline. World, metres. 0 for what the horizon or haze hides altogether.
     pub fn times_threshold(&self, eye: DVec3, at: DVec3, target: &Target, glare: Glare) -> f64 {
