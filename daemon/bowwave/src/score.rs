@@ -120,7 +120,28 @@ pub fn text(sheet: &ScoreSheet) -> String {
     if sheet.rounds.neutral_hits > 0 {
         text += &format!("NEUTRALS  {} rounds struck a neutral boat\n", sheet.rounds.neutral_hits);
     }
+    text += &detection(sheet);
     text + &boats(sheet)
+}
+
+/// The hostile boat that was detected last after it could be seen, and how many never were.
+fn detection(sheet: &ScoreSheet) -> String {
+    let hostile = || sheet.boats.iter().filter(|b| b.side == Some("hostile") && b.in_view_m.is_some());
+    let seen = hostile().filter_map(|b| Some((b, b.detected_s?, b.in_view_m?)));
+    let found = seen.clone().count();
+    let Some((boat, after_s, range_m)) = seen.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+        return if hostile().next().is_some() {
+            "seen      no hostile boat was detected\n".to_owned()
+        } else {
+            String::new()
+        };
+    };
+    let name = one_line(&boat.name);
+    let slowest = if found > 1 { format!("the slowest, {name},") } else { name };
+    format!(
+        "seen      {found} of {} hostile boats detected; {slowest} {after_s:.1} s after it could be seen at {range_m:.0} m\n",
+        hostile().count()
+    )
 }
 
 fn rounds(sheet: &ScoreSheet) -> String {
@@ -153,9 +174,19 @@ fn boats(sheet: &ScoreSheet) -> String {
     let seconds = |s: Option<f64>| s.map_or_else(|| "-".to_owned(), |s| format!("{s:.1}"));
     let metres = |m: Option<f64>| m.map_or_else(|| "-".to_owned(), |m| format!("{m:.0}"));
     let mut rows = vec![
-        ["boat", "side", "in view m", "pointed at s", "reported s", "called", "hits", "ended", "nearest m"]
-            .map(str::to_owned)
-            .to_vec(),
+        [
+            "boat",
+            "side",
+            "could be seen m",
+            "detected s",
+            "reported s",
+            "called",
+            "hits",
+            "ended",
+            "nearest m",
+        ]
+        .map(str::to_owned)
+        .to_vec(),
     ];
     for boat in &sheet.boats {
         let fate = match (boat.sank, boat.burns) {
@@ -178,7 +209,7 @@ fn boats(sheet: &ScoreSheet) -> String {
             one_line(&boat.name),
             boat.side.unwrap_or("-").to_owned(),
             metres(boat.in_view_m),
-            seconds(boat.pointed_s),
+            seconds(boat.detected_s),
             seconds(boat.reported_s),
             boat.identified_as.unwrap_or("-").to_owned(),
             boat.hits.to_string(),

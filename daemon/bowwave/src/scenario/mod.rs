@@ -13,11 +13,16 @@ pub use self::{
 use std::path::Path;
 
 use anyhow::Result;
-use bowwave_core::world::{
-    boats::Behaviour,
-    exercise::Engagement,
-    scenario::{self, Scenario, Side},
+use bowwave_core::{
+    time::Time,
+    world::{
+        boats::Behaviour,
+        exercise::Engagement,
+        scenario::{self, Scenario, Side},
+        seeing::{SceneLight, Target},
+    },
 };
+use glam::DVec2;
 use serde::Serialize;
 
 use crate::{
@@ -108,6 +113,22 @@ fn list(arguments: &ScenarioList) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
+/// A sentence about the ranges at which a small boat is seen as a scenario begins.
+fn seen_from(scenario: &Scenario) -> String {
+    /// A skiff that shows neither bow nor side, grey and without lights.
+    const SKIFF: Target =
+        Target { breadth_m: 4.0, height_m: 1.2, reflectance: 0.3, lamp_lux: 0.0, candela: 0.0 };
+    let seeing = SceneLight::new(&scenario.daylight, scenario.wind.length()).at(Time::from_ns(0));
+    let first =
+        scenario.boats.iter().map(|boat| boat.behaviour.begin().position).find(|at| at.length() > 1.0);
+    let direction = first.unwrap_or(DVec2::Y).extend(0.0).normalize();
+    let range_m = seeing.farthest_m(scenario.eye_height_m, direction, &SKIFF, 20_000.0);
+    format!(
+        "a skiff without lights could be seen from {:.0} m on, in the direction of the first boat",
+        range_m
+    )
+}
+
 fn check(arguments: &ScenarioCheck) -> Result<Outcome> {
     let mut outcome = Outcome::Done;
     for path in &arguments.files {
@@ -118,6 +139,7 @@ fn check(arguments: &ScenarioCheck) -> Result<Outcome> {
                     "{}: \"{}\" is sound: {} hostile and {} neutral boats, {} with crews\n",
                     l.name, l.title, l.hostile, l.neutral, l.crewed
                 ))?;
+                stdout::print(format!("{}: {}\n", l.name, seen_from(&loaded.scenario)))?;
                 for doubt in doubts::of(&loaded.scenario) {
                     eprintln!("{}: look at this: {}", l.name, bowwave_core::text::one_line(&doubt));
                 }

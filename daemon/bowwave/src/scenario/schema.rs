@@ -380,7 +380,12 @@ fn exit() -> Value {
         ("hit", asked("The boat was struck")),
         ("neighbour_hit", asked("A boat of its side within 300 m was struck")),
         ("lit", asked("A searchlight is on it")),
-        ("sees_gun", asked("Nothing hides the gun from it")),
+        (
+            "sees_gun",
+            asked(
+                "It sees the ship that the gun stands on: neither a vessel nor haze nor the dark hides her",
+            ),
+        ),
     ];
     let any: Vec<Value> = guards.iter().map(|(key, _)| json!({ "required": [key] })).collect();
     let mut keys = vec![

@@ -10,7 +10,7 @@ use crate::{
         RunningWorld,
         exercise::STOPPED_M_S,
         fleet::Fleet,
-        seeing::threshold::{UNALERTED, chance},
+        seeing::threshold::{SEEN, UNALERTED, chance},
     },
 };
 
@@ -31,7 +31,7 @@ pub(super) struct Sighted {
     pub velocity: DVec3,
     /// Rate at which somebody who searches comes upon it, 1/s.
     pub found_per_s: f64,
-    /// It is near enough to say what kind of boat it is.
+    /// It is near enough, and seen well enough, to say what kind of boat it is.
     pub is_recognised: bool,
     /// Whose it is; only a judgement of it is used.
     pub side: Side,
@@ -71,7 +71,8 @@ impl Eye {
             at,
             velocity,
             found_per_s: self.found_per_s(range_m, length_m) * chance(times_threshold / UNALERTED),
-            is_recognised: fleet.height_m(boat) / range_m.max(1.0) > RECOGNISED,
+            is_recognised: fleet.height_m(boat) / range_m.max(1.0) > RECOGNISED
+                && chance(times_threshold) >= SEEN,
             side: fleet.side(boat)?,
             is_over,
         })

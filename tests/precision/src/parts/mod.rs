@@ -31,6 +31,7 @@ mod pacing;
 mod phantom;
 mod reflection;
 mod sea;
+mod seeing;
 mod shadow;
 mod shutter;
 mod skylight;
@@ -87,6 +88,7 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: phantom::ABOUT, measure: phantom::measure },
     NumericalPart { about: beam::ABOUT, measure: beam::measure },
     NumericalPart { about: lamps::ABOUT, measure: lamps::measure },
+    NumericalPart { about: seeing::ABOUT, measure: seeing::measure },
     NumericalPart { about: lens::ABOUT, measure: lens::measure },
     NumericalPart { about: drawn::ABOUT, measure: drawn::measure },
     NumericalPart { about: shutter::ABOUT, measure: shutter::measure },

@@ -86,3 +86,7 @@ impl Fleet {
         self.seeing.at(time_s).is_some_and(|seeing| threshold::chance(times(seeing)) >= threshold::SEEN)
     }
 }
+
+#[cfg(test)]
+#[path = "sight_tests.rs"]
+mod tests;

@@ -212,6 +212,8 @@ pub struct BoatSheet {
     pub side: Option<&'static str>,
     /// Range at which it could be seen, metres.
     pub in_view_m: Option<f64>,
+    /// When it was detected: the gun pointed at it, or it was reported, whichever came first.
+    pub detected_s: Option<f64>,
     /// When the gun pointed at it.
     pub pointed_s: Option<f64>,
     /// When it was reported.
@@ -548,6 +550,8 @@ impl ScoreFold {
             name: name.to_owned(),
             side: boat.side.map(Side::name),
             in_view_m: boat.in_view.map(|(_, range_m)| range_m),
+            // Who reports what nobody could see yet has not detected it before that.
+            detected_s: since(boat.pointed.into_iter().chain(boat.reported).min()).map(|s| s.max(0.0)),
             pointed_s: since(boat.pointed),
             reported_s: since(boat.reported),
             identified_s: since(boat.identified.last().map(|(time, _)| *time)),

@@ -82,6 +82,24 @@ fn a_flawless_run_has_all_points() {
     assert_eq!(sheet.calls, CallsSheet { asked: 2, in_time: 2, ..CallsSheet::default() });
     let a = &sheet.boats[0];
     assert_eq!((a.reported_s, a.identified_as, a.hits), (Some(4.0), Some("hostile"), 1));
+    assert_eq!((a.detected_s, a.pointed_s), (Some(4.0), None));
+}
+
+#[test]
+fn a_boat_is_detected_by_the_gun_or_by_word_and_never_before_it_could_be_seen() {
+    let pointed =
+        |s: f64, boat: &str| event(s, ExerciseFact::Pointed { boat: boat.to_owned(), range_m: 700.0 });
+    let events = [
+        began(2, 0.0),
+        did(1.0, Act::Report, "b", 950.0),
+        in_view(2.0, "a", Side::Hostile),
+        in_view(3.0, "b", Side::Hostile),
+        pointed(6.0, "a"),
+        did(8.0, Act::Report, "a", 800.0),
+        in_view(9.0, "c", Side::Hostile),
+    ];
+    let detected: Vec<Option<f64>> = sheet(&events, &[]).boats.iter().map(|boat| boat.detected_s).collect();
+    assert_eq!(detected, [Some(4.0), Some(0.0), None]);
 }
 
 #[test]

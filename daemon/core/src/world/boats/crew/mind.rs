@@ -97,7 +97,7 @@ pub struct Signals {
     pub neighbour_hit: bool,
     /// A searchlight is on it.
     pub lit: bool,
-    /// Nothing hides the gun.
+    /// It sees the ship that the gun stands on, or her searchlight.
     pub sees_gun: bool,
 }
 

@@ -105,6 +105,6 @@ pub struct Guard {
     pub neighbour_hit: bool,
     /// A searchlight is on it.
     pub lit: bool,
-    /// Nothing hides the gun from it.
+    /// It sees the ship that the gun stands on, or her searchlight.
     pub sees_gun: bool,
 }
