@@ -10,7 +10,7 @@ use crate::{
         RunningWorld,
         exercise::STOPPED_M_S,
         fleet::Fleet,
-        seeing::threshold::{SEEN, UNALERTED, chance},
+        seeing::threshold::{SEEN, chance},
     },
 };
 
@@ -70,7 +70,8 @@ impl Eye {
             boat,
             at,
             velocity,
-            found_per_s: self.found_per_s(range_m, length_m) * chance(times_threshold / UNALERTED),
+            // That searchers do not know where to look is in the sweep widths already.
+            found_per_s: self.found_per_s(range_m, length_m) * chance(times_threshold),
             is_recognised: fleet.height_m(boat) / range_m.max(1.0) > RECOGNISED
                 && chance(times_threshold) >= SEEN,
             side: fleet.side(boat)?,

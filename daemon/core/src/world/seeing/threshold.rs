@@ -13,8 +13,6 @@ pub const DARKEST_CD_M2: f64 = 1e-5;
 pub const BRIGHTEST_CD_M2: f64 = 3426.0;
 /// Factor between thresholds of trained people in a laboratory and of people who say that they see something (Crumey 2014, 1.6: 1.4 to 2.4).
 pub const FIELD: f64 = 2.0;
-/// Factor more for somebody who does not know where to look: five or more (American Meteorological Society, glossary, threshold contrast).
-pub const UNALERTED: f64 = 5.0;
 /// Deviation of the contrasts at which people begin to see, as a share of the threshold (Blackwell 1946: a normal ogive).
 pub const SPREAD: f64 = 0.48;
 /// Chance of a glimpse from which on something counts as seen by somebody who looks at it.
