@@ -1,4 +1,7 @@
 // One drawn boat (set 0, binding 1). Directions and planes are in the boat's own space, so normals need no transform.
+// Most flares and fires that light one boat.
+const int BOAT_LAMPS = 4;
+
 struct BoatBlock {
     vec4 camera_from_boat[3];  // rows
     vec4 water_plane;          // dot(plane, (p, 1)): metres above the mean water
@@ -7,6 +10,9 @@ struct BoatBlock {
     vec4 eye;                  // xyz: the eye; w: share of the light that haze replaces
     vec4 lobes[9];             // light of the whole sky: its lobes' radiances
     vec4 shadow_from_boat[3];  // rows: to texels of the shadow map and nearness to the sun
+    vec4 lamps[BOAT_LAMPS];    // xyz: a lamp that lights it, metres; w is unused
+    vec4 lamp_lights[BOAT_LAMPS];  // rgb: linear radiance of white matt that faces it a metre off, less what air takes on the way
+    vec4 air;                  // rgb: lamplight of the air before it
 };
 
 layout(std430, set = 0, binding = 1) readonly buffer Boats {

@@ -2,7 +2,6 @@
 #include "frame.glsl"
 #include "lens.glsl"
 #include "boat_block.glsl"
-#include "lamplight_block.glsl"
 
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
@@ -57,20 +56,10 @@ vec3 lit_by_searchlight(BoatBlock boat, vec3 in_camera) {
 // Light of flares and fires: what the corner faces of them, without shadows.
 vec3 lit_by_lamps(BoatBlock boat) {
     vec3 sum = vec3(0.0);
-    int count = int(frame.row_turn.w);
-    for (int i = 0; i < count; i++) {
-        vec3 off = frame.lamps[i].xyz
-            - vec3(boat.camera_from_boat[0].w, boat.camera_from_boat[1].w, boat.camera_from_boat[2].w);
-        vec3 lamp = boat.camera_from_boat[0].xyz * off.x + boat.camera_from_boat[1].xyz * off.y
-            + boat.camera_from_boat[2].xyz * off.z;
-#ifdef MIRRORED
-        // The matrix mirrors the boat, so that this is the lamp's own mirror image.
-        lamp -= boat.water_plane.xyz * (2.0 * dot(boat.water_plane, vec4(lamp, 1.0)));
-#endif
-        vec3 towards = lamp - position;
-        float range = max(length(towards), 1.0);
-        float facing = max(dot(normal, towards), 0.0) / range;
-        sum += frame.lamp_lights[i].rgb * (facing * exp(-frame.lamps[i].w * range) / (range * range));
+    for (int i = 0; i < BOAT_LAMPS; i++) {
+        vec3 towards = boat.lamps[i].xyz - position;
+        float squared = max(dot(towards, towards), 1.0);
+        sum += boat.lamp_lights[i].rgb * (max(dot(normal, towards), 0.0) * inversesqrt(squared) / squared);
     }
     return albedo * sum;
 }
@@ -101,8 +90,8 @@ void main() {
 #else
     around_out = mix(around_out, frame.horizon.rgb, boat.eye.w);
 #ifndef MIRRORED
-    if (LAMPLIGHT && frame.horizon.a > 0.0) {
-        around_out += air_at((gl_Position.xy / max(gl_Position.w, 1e-6) * 0.5 + 0.5) * frame.size);
+    if (LAMPLIGHT) {
+        around_out += boat.air.rgb;
     }
     sun_out *= 1.0 - boat.eye.w;
 #endif

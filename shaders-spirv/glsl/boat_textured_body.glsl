@@ -1,7 +1,6 @@
 // A boat with a texture: what is transparent in it is not there.
 #include "frame.glsl"
 #include "boat_block.glsl"
-#include "lamplight_block.glsl"
 #include "coded_light.glsl"
 
 // Samples a pixel of the layer drawn to: a texture's alpha becomes coverage of that many steps.
@@ -36,9 +35,7 @@ void main() {
 #endif
     vec3 seen = mix(light * texel.rgb, frame.horizon.rgb, boats[draw.index].eye.w);
 #ifndef MIRRORED
-    if (frame.horizon.a > 0.0) {
-        seen += air_at(gl_FragCoord.xy);
-    }
+    seen += boats[draw.index].air.rgb;
 #endif
     colour = vec4(coded(seen), 1.0);
 }

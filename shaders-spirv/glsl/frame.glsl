@@ -1,8 +1,5 @@
 // Blocks that every drawing pass shares. The host's side is src/interface.rs; a test holds the two together.
 
-// Most flares and fires.
-const int LAMPS = 8;
-
 // Light and lens of one frame (set 0, binding 0).
 layout(std140, set = 0, binding = 0) uniform FrameBlock {
     vec2 focal;       // pixels
@@ -14,12 +11,10 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     vec4 sun;         // linear radiance of white matt, facing the sun
     vec4 sky;         // the same, seeing only the upper sky
     vec4 sea;         // the same, seeing only the sea
-    vec4 horizon;     // rgb: radiance of the horizon; a: 1 while lamps shine
+    vec4 horizon;     // radiance of the horizon
     vec4 lamp;        // xyz: the searchlight, camera's axes, metres; w: its light falls with exp(-w sin^2 of the angle off its axis)
     vec4 beam;        // xyz: its axis, camera's axes; w: linear radiance of white matt that faces it a metre off
-    vec4 row_turn;    // xyz: the camera's turn from row to row while a rolling shutter reads, radians about its axes; w: how many lamps there are
-    vec4 lamps[LAMPS];       // xyz: a lamp, camera's axes, metres; w: share of light that air takes in a metre
-    vec4 lamp_lights[LAMPS]; // rgb: linear radiance of white matt that faces it a metre off
+    vec4 row_turn;    // the camera's turn from row to row while a rolling shutter reads, radians about its axes
 } frame;
 
 // Pixels to clip space.

@@ -13,6 +13,6 @@ layout(location = 0) out vec3 light;
 
 void main() {
     ivec2 place = lamplight.cells.xy + ivec2(gl_InstanceIndex + (gl_VertexIndex & 1), gl_VertexIndex >> 1);
-    light = nodes[place.y * lamplight.cells.w + place.x].both.rgb;
+    light = nodes[place.y * lamplight.cells.w + place.x].light.rgb;
     gl_Position = clip_from_pixels(vec2(place) * lamplight.cell_px);
 }

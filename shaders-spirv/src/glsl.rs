@@ -2,8 +2,8 @@
 
 /// Reflection methods and shadow levels.
 pub const METHODS: &str = include_str!("../glsl/water_methods.glsl");
-/// What all drawing shares.
-pub const FRAME: &str = include_str!("../glsl/frame.glsl");
+/// A drawn boat.
+pub const BOAT: &str = include_str!("../glsl/boat_block.glsl");
 /// Pools of light.
 pub const POOL: &str = include_str!("../glsl/pool_block.glsl");
 /// The Physics shader.

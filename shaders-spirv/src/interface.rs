@@ -27,8 +27,8 @@ macro_rules! block {
     };
 }
 
-/// Most lamps of a frame.
-pub const LAMPS: usize = crate::glsl::number(crate::glsl::FRAME, "const int LAMPS") as usize;
+/// Most lamps that light one boat.
+pub const BOAT_LAMPS: usize = crate::glsl::number(crate::glsl::BOAT, "const int BOAT_LAMPS") as usize;
 /// Rings of a pool of light...
 pub const POOL_RINGS: u32 = crate::glsl::number(crate::glsl::POOL, "const int POOL_RINGS");
 /// ...and its sectors.
@@ -55,18 +55,14 @@ block! {
         pub sky: [f32; 4],
         /// The same, seeing only the sea.
         pub sea: [f32; 4],
-        /// Radiance of the horizon; the last is 1 while lamps shine.
+        /// Radiance of the horizon.
         pub horizon: [f32; 4],
         /// The searchlight, camera's axes, metres; the last is how its light falls off its axis, 1/rad^2.
         pub lamp: [f32; 4],
         /// Its axis, camera's axes; the last is the linear radiance of a white matt surface that faces it a metre off, 0 while it is off.
         pub beam: [f32; 4],
-        /// The camera's turn from row to row while a rolling shutter reads, radians about its axes; the last is how many lamps there are.
+        /// The camera's turn from row to row while a rolling shutter reads, radians about its axes; the last is unused.
         pub row_turn: [f32; 4],
-        /// Lamps, camera's axes, metres; the last is the share of light that air takes in a metre.
-        pub lamps: [[f32; 4]; LAMPS],
-        /// Linear radiance of a white matt surface that faces each a metre off; the last is unused.
-        pub lamp_lights: [[f32; 4]; LAMPS],
     }
 }
 
@@ -88,6 +84,12 @@ block! {
         /// Rows of the matrix from the boat's space to texels of the shadow map and nearness to the sun, 0 to 1; nearness 2 where
         /// nothing shades the boat.
         pub shadow_from_boat: [[f32; 4]; 3],
+        /// Lamps that light it, metres; the last is unused.
+        pub lamps: [[f32; 4]; BOAT_LAMPS],
+        /// Linear radiance of a white matt surface that faces each a metre off, less what air takes on the way; the last is unused.
+        pub lamp_lights: [[f32; 4]; BOAT_LAMPS],
+        /// Lamplight of the air before it; the last is unused.
+        pub air: [f32; 4],
     }
 }
 
@@ -122,10 +124,8 @@ block! {
 block! {
     /// A node of that grid: `LamplightNode`, set 0, binding 10, std430.
     pub struct LamplightNode {
-        /// Light of the air before everything; the last is pixels from node to node.
-        pub air: [f32; 4],
-        /// The same and that of the sea; the last is nodes of a row.
-        pub both: [f32; 4],
+        /// Light of air and sea; the last is unused.
+        pub light: [f32; 4],
     }
 }
 

@@ -223,6 +223,9 @@ impl Plan {
         if scene.runs(Pass::Shadow) {
             self.shadows.make(scene, |id| models.get(usize::from(id.0)).map(|outline| &outline.model));
         }
+        if scene.runs(Pass::Lamplight) {
+            self.lamplight.make(scene, &mut self.touched);
+        }
         if scene.runs(Pass::Boats) {
             self.plan_boats(scene, models, size);
         }
@@ -231,9 +234,6 @@ impl Plan {
         }
         if scene.runs(Pass::Wake) {
             self.plan_wakes(scene);
-        }
-        if scene.runs(Pass::Lamplight) {
-            self.lamplight.make(scene, &mut self.touched);
         }
         if scene.runs(Pass::Lights) {
             self.plan_lights(scene);
@@ -297,7 +297,9 @@ impl Plan {
                 rect,
                 detail_m,
             });
-            self.boat_blocks.push(view::boat_block(scene, boat, &pose, self.shadows.shade(i), false));
+            let air = self.lamplight.air_at(hull).extend(0.0).to_array();
+            let block = view::boat_block(scene, boat, &pose, self.shadows.shade(i), false);
+            self.boat_blocks.push(BoatBlock { air, ..block });
             if let Some(spray) = spray {
                 self.sprayed.push((i, spray));
             }

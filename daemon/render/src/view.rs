@@ -4,14 +4,15 @@
 use bowwave_core::{
     estimate::light::Light,
     frame::{
-        scene::{BoatView, Pass, Scene},
+        lamps::LampView,
+        scene::{BoatView, Scene},
         view::NEAR_M,
     },
     geometry::{CameraPose, Distortion, Lens, RigidPose, horizon_dip},
     model::ModelKind,
 };
 use glam::{DMat3, DQuat, DVec3, DVec4, Vec3};
-use shaders_spirv::interface::{BoatBlock, FrameBlock, LAMPS};
+use shaders_spirv::interface::{BOAT_LAMPS, BoatBlock, FrameBlock};
 
 /// Lens and light.
 pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
@@ -23,12 +24,6 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
         let matt = light.strength * std::f64::consts::FRAC_1_PI;
         (light.lamp.extend(light.sharpness).as_vec4(), light.axis.extend(matt).as_vec4())
     });
-    let (mut lamps, mut lamp_lights) = ([[0.0; 4]; LAMPS], [[0.0; 4]; LAMPS]);
-    for (i, lamp) in scene.lamps.iter().take(LAMPS).enumerate() {
-        let at = scene.camera.to_camera(lamp.at);
-        lamps[i] = at.extend(lamp.extinction_per_m).as_vec4().to_array();
-        lamp_lights[i] = light(lamp.strength * std::f32::consts::FRAC_1_PI);
-    }
     FrameBlock {
         focal: pair(lens.focal),
         centre: pair(lens.centre),
@@ -39,12 +34,10 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
         sun: light(sun),
         sky: light(sky),
         sea: light(sea),
-        horizon: horizon.extend(f32::from(u8::from(scene.runs(Pass::Lamplight)))).to_array(),
+        horizon: light(horizon),
         lamp: lamp.to_array(),
         beam: beam.to_array(),
-        row_turn: lens.row_turn.extend(scene.lamps.len().min(LAMPS) as f64).as_vec4().to_array(),
-        lamps,
-        lamp_lights,
+        row_turn: lens.row_turn.extend(0.0).as_vec4().to_array(),
     }
 }
 
@@ -145,7 +138,11 @@ pub(crate) fn boat_block(
         _ => [0.0, 0.0, 0.0, 1.0],
     };
     let lobes = scene.light.dome.turned(pose.world_from_body).terms;
+    let (lamps, lamp_lights) = lamps_on(scene, pose);
     BoatBlock {
+        lamps,
+        lamp_lights,
+        air: [0.0; 4],
         lobes: lobes.map(|light| light.extend(0.0).to_array()),
         camera_from_boat: [row(0), row(1), row(2)],
         water_plane,
@@ -157,6 +154,29 @@ pub(crate) fn boat_block(
         shadow_from_boat: shade.from_boat,
         eye: (boat_from_world * (eye - pose.position)).extend(f64::from(boat.haze)).as_vec4().to_array(),
     }
+}
+
+/// Places and lights of the lamps that light a boat most, in its space.
+fn lamps_on(scene: &Scene, pose: &RigidPose) -> ([[f32; 4]; BOAT_LAMPS], [[f32; 4]; BOAT_LAMPS]) {
+    let (mut places, mut lights) = ([[0.0; 4]; BOAT_LAMPS], [[0.0; 4]; BOAT_LAMPS]);
+    let strength = |lamp: &LampView| lamp.matt_at(pose.position).max_element();
+    let mut count = 0;
+    for lamp in &scene.lamps {
+        // Insertion: the brightest stay.
+        let place = (0..count).find(|i| strength(lamp) > lights[*i][3]).unwrap_or(count);
+        if place == BOAT_LAMPS {
+            continue;
+        }
+        places[place..].rotate_right(1);
+        lights[place..].rotate_right(1);
+        let from_lamp = pose.world_from_body.inverse() * (lamp.at - pose.position);
+        places[place] = from_lamp.extend(0.0).as_vec4().to_array();
+        let air = (-lamp.extinction_per_m * from_lamp.length()).exp() as f32;
+        let matt = lamp.strength * (std::f32::consts::FRAC_1_PI * air);
+        lights[place] = matt.extend(strength(lamp)).to_array();
+        count = (count + 1).min(BOAT_LAMPS);
+    }
+    (places, lights)
 }
 
 /// Upward normal of the plane that holds the eye and the stretch of sea horizon before `target`.

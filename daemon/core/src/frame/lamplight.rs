@@ -119,7 +119,7 @@ impl LightGrid {
     fn add_lamp(&mut self, lamp: &LampView, camera: &CameraPose, down: DVec3, wind_m_s: f64) {
         let at = camera.to_camera(lamp.at);
         let range_m = at.length();
-        if !(range_m > 1.0) || !lamp.strength.is_finite() {
+        if range_m.is_nan() || range_m <= 1.0 || !lamp.strength.is_finite() {
             return;
         }
         // Within half a cell of the lamp its glow is what a lens makes of it.

@@ -89,7 +89,7 @@ pub(super) fn lamps_at(
         let strength = Burning::colour() * (fire.candela(time_s) / white_cd_m2) as f32;
         Some(LampView { at, strength, extinction_per_m, is_high: false })
     });
-    let flares = running.flares.iter().rev().filter_map(|flare| {
+    let flares = running.fleet.flares().iter().rev().filter_map(|flare| {
         let strength = Vec3::splat((flare.candela(time) / white_cd_m2) as f32);
         Some(LampView { at: flare.at(time)?, strength, extinction_per_m, is_high: true })
     });

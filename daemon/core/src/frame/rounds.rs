@@ -142,14 +142,7 @@ mod tests {
         fleet.strike(0, &strike, start.plus_secs(1.0));
         let ammunition = Ammunition { weapon: scenario.weapon.clone(), wind: DVec3::ZERO, seed: 1 };
         let rounds = Rounds::new(ammunition, scenario.wave_field(), start);
-        RunningWorld {
-            start,
-            now: start.plus_secs(30.0),
-            fleet,
-            rounds,
-            flares: Vec::new(),
-            fired: VecDeque::new(),
-        }
+        RunningWorld { start, now: start.plus_secs(30.0), fleet, rounds, fired: VecDeque::new() }
     }
 
     #[test]

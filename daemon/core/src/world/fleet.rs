@@ -17,6 +17,7 @@ use crate::{
             Orders, RoundStrike, Signals, StepView, Traffic, step_after, step_seconds,
         },
         contact::Capsule,
+        flare::Flare,
         scenario::{BoatSpec, Scenario, Side},
         searchlight::{Beam, Searchlight},
         seeing::{SceneLight, Seeing, SeeingLog},
@@ -141,6 +142,7 @@ pub struct Fleet {
     /// Orders of the person who drives boats, each from those seconds on.
     driven: Vec<(f64, Orders)>,
     searchlight: Option<Searchlight>,
+    flares: Vec<Flare>,
     seeing: SeeingLog,
     /// Height of the gun over the water, metres.
     gun_m: f64,
@@ -172,6 +174,7 @@ impl Fleet {
             struck,
             driven,
             searchlight: None,
+            flares: Vec::new(),
             seeing: SeeingLog::steady(Seeing::clear_day()),
             gun_m: Self::GUN_M,
             reflectances,
@@ -194,6 +197,16 @@ impl Fleet {
     /// The same where the gun has a searchlight.
     pub fn with_searchlight(self, searchlight: Option<Searchlight>) -> Self {
         Self { searchlight, ..self }
+    }
+
+    /// A flare is lit.
+    pub fn light_flare(&mut self, flare: Flare) {
+        self.flares.push(flare);
+    }
+
+    /// Flares that were lit, oldest first.
+    pub fn flares(&self) -> &[Flare] {
+        &self.flares
     }
 
     /// The searchlight's beam is this from `time` on. Boats have not been followed that far.

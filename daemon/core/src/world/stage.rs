@@ -109,8 +109,6 @@ pub struct RunningWorld {
     pub fleet: Fleet,
     /// The rounds.
     pub rounds: Rounds,
-    /// Flares that were lit, oldest first.
-    pub flares: Vec<Flare>,
     /// When the newest rounds left the barrel, oldest first; no more than [`FIRED_KEPT`].
     pub fired: VecDeque<Time>,
 }
@@ -353,7 +351,9 @@ impl World {
             self.weapon.stop_next();
         }
         let (lit, wind) = (running.now, self.ammunition.wind.truncate());
-        running.flares.extend(orders.flares.into_iter().map(|spec| Flare { spec, lit, wind }));
+        for spec in orders.flares {
+            running.fleet.light_flare(Flare { spec, lit, wind });
+        }
         for event in &self.events {
             if let ExerciseFact::Message { text } = &event.fact {
                 self.message = Some((event.time, text.as_str().into()));
@@ -388,7 +388,7 @@ impl World {
             .with_seeing(self.light.clone().at(start), self.eye_m);
         let rounds = Rounds::new(self.ammunition.clone(), self.waves.clone(), start);
         let fired = VecDeque::with_capacity(FIRED_KEPT + 1);
-        RunningWorld { start, now: start, fleet, rounds, flares: Vec::new(), fired }
+        RunningWorld { start, now: start, fleet, rounds, fired }
     }
 
     /// Rounds still in the air are recorded as misses: the session ends here.

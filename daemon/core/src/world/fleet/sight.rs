@@ -5,9 +5,11 @@ use glam::{DVec2, DVec3};
 use super::Fleet;
 use crate::{
     geometry::{ahead, starboard},
+    physics::extinction_per_m,
     time::Time,
     world::{
         boats::{CourseState, FIRE_CANDELA_KW, Traffic, fire_heat_kw},
+        flare::Flare,
         seeing::{Glare, Seeing, Target, threshold},
     },
 };
@@ -43,6 +45,18 @@ impl Fleet {
         self.seeing.at(time.secs_since(self.start))
     }
 
+    /// Illuminance by flares of what faces them at `at`, lux.
+    fn flares_lux(&self, at: DVec3, time: Time) -> f64 {
+        /// Nearer than this a flare is no point, metres.
+        const NEAREST_M: f64 = 1.0;
+        let air = self.seeing(time).map_or(0.0, |seeing| extinction_per_m(seeing.visibility_m));
+        let lux = |flare: &Flare| {
+            let range_m = flare.at(time)?.distance(at).max(NEAREST_M);
+            Some(flare.candela(time) * (-air * range_m).exp() / (range_m * range_m))
+        };
+        self.flares.iter().filter_map(lux).sum()
+    }
+
     /// A boat as somebody at `eye` has it before the eye.
     fn target(&self, boat: usize, state: &CourseState, eye: DVec3, time: Time) -> Target {
         let time_s = time.secs_since(self.start);
@@ -58,13 +72,15 @@ impl Fleet {
             towards_eye.z,
         );
         let lights = self.lights(boat, time).iter().map(|light| light.candela_towards(of_boat)).sum::<f64>();
-        let fire = me.history.fire_s().map_or(0.0, |lit_s| fire_heat_kw(time_s - lit_s) * FIRE_CANDELA_KW);
+        let burns = self.burns_since(boat).map_or(0.0, |since| fire_heat_kw(time.secs_since(since)));
+        let fire = burns * FIRE_CANDELA_KW;
         let middle = state.position.extend(0.5 * height_m);
         Target {
             breadth_m: hull.length_m * across.abs() + hull.beam_m * along.abs(),
             height_m: (height_m - me.history.settled_m(time_s)).max(0.0),
             reflectance: self.reflectances.get(usize::from(me.model.0)).copied().unwrap_or(SHIP_REFLECTANCE),
-            lamp_lux: self.searchlight.as_ref().map_or(0.0, |lamp| lamp.lux(middle, time_s)),
+            lamp_lux: self.searchlight.as_ref().map_or(0.0, |lamp| lamp.lux(middle, time_s))
+                + self.flares_lux(middle, time),
             candela: lights + fire,
         }
     }

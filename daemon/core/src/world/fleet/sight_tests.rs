@@ -1,11 +1,12 @@
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use super::*;
 use crate::{
     model::{Model, ModelId},
     world::{
+        flare::FlareSpec,
         scenario::Scenario,
         score::boxed_model,
         searchlight::{Beam, Searchlight},
@@ -94,4 +95,15 @@ fn what_stands_before_a_boat_hides_it() {
         DVec2::Y * 800.0,
         [Traffic { radius_m: 3.0, ..large }, large].into_iter()
     ));
+}
+
+#[test]
+fn a_flare_shows_a_dark_boat_at_night_and_a_boat_on_fire_shows_itself() {
+    let (_, mut dark) = fleet(-20.0, &[&at_800_m("")]);
+    assert_eq!(seen(&dark), [false]);
+    let spec = FlareSpec::rocket(DVec2::new(0.0, 700.0));
+    dark.light_flare(Flare { spec, lit: start().plus_secs(-5.0), wind: DVec2::ZERO });
+    assert_eq!(seen(&dark), [true]);
+    assert!(dark.seen_from(GUN, start().plus_secs(40.0))[0] < 1.0, "it has burnt out");
+    assert_eq!(seen(&fleet(-20.0, &[&at_800_m("burns_at_s = 0")]).1), [true]);
 }

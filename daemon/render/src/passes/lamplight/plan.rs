@@ -13,11 +13,9 @@ use bowwave_core::{
     physics::haze_share,
 };
 use glam::{DVec2, DVec3, Vec3};
-use shaders_spirv::interface::{LAMPS, LamplightBlock, LamplightNode, PoolBlock};
+use shaders_spirv::interface::{LamplightBlock, LamplightNode, PoolBlock};
 
 use crate::rects::cut;
-
-const _: () = assert!(LAMPS_MAX <= LAMPS, "the shaders have no room for all lamps");
 
 /// Linear light below which nothing is drawn: a third of a code in the dark.
 const LEAST: f32 = 1e-4;
@@ -72,16 +70,29 @@ impl LamplightPlan {
     /// Finds the light; appends what it reaches to `touched`.
     pub(crate) fn make(&mut self, scene: &Scene, touched: &mut Vec<PixelRect>) {
         self.grid.light(&scene.lamplight(), &scene.camera, &scene.lens);
-        let (columns, cell_px) = (self.grid.columns() as f32, self.grid.cell_px() as f32);
-        self.nodes.extend(self.grid.nodes().iter().map(|node| LamplightNode {
-            air: node.air.extend(cell_px).to_array(),
-            both: (node.air + node.sea).extend(columns).to_array(),
-        }));
+        let light = |node: &NodeLight| (node.air + node.sea).extend(0.0).to_array();
+        self.nodes.extend(self.grid.nodes().iter().map(|node| LamplightNode { light: light(node) }));
         rows_of(&self.grid, (scene.lens.width, scene.lens.height), &mut self.cells);
         self.pools
             .extend(scene.lamps.iter().filter(|lamp| !lamp.is_high).filter_map(|lamp| pool(scene, lamp)));
         touched.extend(self.cells.iter().map(|row| row.rect));
         touched.extend(self.pools.iter().map(|pool| pool.rect));
+    }
+}
+
+impl LamplightPlan {
+    /// Light of the air before a boat: the mean of the corners of its pixels, since a fire of its own outshines all in their middle. Zero while
+    /// no lamp shines. It is that of whole lines of sight: what lies behind a boat is little.
+    pub(crate) fn air_at(&self, rect: PixelRect) -> Vec3 {
+        if self.nodes.is_empty() {
+            return Vec3::ZERO;
+        }
+        let cell = |pixel: u32| (f64::from(pixel) / self.grid.cell_px()).round() as usize;
+        let (columns, rows) =
+            ([rect.x, rect.x + rect.width].map(cell), [rect.y, rect.y + rect.height].map(cell));
+        let node = |column: usize, row: usize| self.grid.nodes().get(row * self.grid.columns() + column);
+        let corners = rows.into_iter().flat_map(|row| columns.map(|column| node(column, row)));
+        corners.flatten().map(|node| node.air * 0.25).sum()
     }
 }
 
@@ -120,7 +131,7 @@ fn pool(scene: &Scene, lamp: &LampView) -> Option<Pool> {
     let light = lamp.strength * SEA_ALBEDO * (FRAC_1_PI as f32 * air);
     let strength = f64::from(light.max_element());
     let reach_m = (strength * height_m / f64::from(LEAST)).cbrt().min(POOL_MOST_M).min(POOL_SHARE * range_m);
-    if !(reach_m > height_m) {
+    if reach_m.is_nan() || reach_m <= height_m {
         return None;
     }
     let rim = |i: u32| {
