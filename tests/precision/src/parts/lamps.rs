@@ -29,6 +29,9 @@ const SIZE: (u32, u32) = (1280, 720);
 /// Distance at which a line of sight above the horizon ends, metres.
 const FAR_M: f64 = 1e5;
 
+/// A rule for the light along a line of sight, which ends somewhere.
+type Rule = fn(&Case, DVec3, (DVec3, f64)) -> f64;
+
 /// A lamp of intensity 1 in some air.
 #[derive(Clone, Copy)]
 struct Case {
@@ -109,7 +112,7 @@ fn lit(grid: &mut LightGrid, case: &Case) {
 }
 
 /// Errors of the product and of rules, over nodes that stand for all.
-fn errors(case: &Case, rules: &[fn(&Case, DVec3, (DVec3, f64)) -> f64]) -> Vec<f64> {
+fn errors(case: &Case, rules: &[Rule]) -> Vec<f64> {
     const EVERY: usize = 29;
     let mut grid = LightGrid::new(SIZE);
     lit(&mut grid, case);
@@ -132,7 +135,6 @@ fn errors(case: &Case, rules: &[fn(&Case, DVec3, (DVec3, f64)) -> f64]) -> Vec<f
     worst.into_iter().map(|error| error / brightest).collect()
 }
 
-type Rule = fn(&Case, DVec3, (DVec3, f64)) -> f64;
 const RULES: [(&str, &str, Rule); 3] = [
     ("steps of the angle at each node", "16", by_angle::<16, true>),
     ("steps of the angle at each node", "48", by_angle::<48, true>),
