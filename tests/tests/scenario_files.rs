@@ -104,7 +104,7 @@ bearing_deg = 20
 "#;
 
 /// What stands in the sound one, what stands in its place, the key that is named, and whether a schema can tell.
-const MISTAKES: [(&str, &str, &str, bool); 68] = [
+const MISTAKES: [(&str, &str, &str, bool); 71] = [
     ("name = \"Everything\"", "name = 5", "name", true),
     ("name = \"Everything\"", "name = \"\"", "name", true),
     ("seed = 3", "seed = -3", "seed", true),
