@@ -109,7 +109,7 @@ pub struct RunningWorld {
     pub fleet: Fleet,
     /// The rounds.
     pub rounds: Rounds,
-    /// When the newest rounds left the barrel, oldest first; no more than [`FIRED_KEPT`].
+    /// When the newest rounds left the barrel, oldest first; a handful at most.
     pub fired: VecDeque<Time>,
 }
 
