@@ -60,7 +60,10 @@ struck = true
 stoppage = true
 [[event]]
 at_s = 50
-flare = { bearing_deg = 5, range_m = 400, height_m = 250 }
+[event.flare]
+bearing_deg = 77
+range_m = 432
+height_m = 250
 [[crew]]
 name = "wolf"
 [[crew.state]]
@@ -136,9 +139,9 @@ const MISTAKES: [(&str, &str, &str, bool); 71] = [
     ("candela = 150000", "candela = 50", "searchlight.candela", true),
     ("beam_deg = 6", "beam = 6", "searchlight.beam", true),
     ("on = true", "on = \"yes\"", "searchlight.on", true),
-    ("flare = { bearing_deg = 5,", "flare = { bearing = 5,", "event[3].flare.bearing", true),
-    ("range_m = 400, height_m = 250", "range_m = 400, height_m = 5", "event[3].flare.height_m", true),
-    ("range_m = 400, height_m = 250", "height_m = 250", "event[3].flare.range_m", true),
+    ("bearing_deg = 77", "bearing = 77", "event[3].flare.bearing", true),
+    ("height_m = 250", "height_m = 5", "event[3].flare.height_m", true),
+    ("range_m = 432\n", "", "event[3].flare.range_m", true),
     ("lit = true", "lit = false", "crew[1].state[1].next[1].lit", true),
     ("engagement = \"warn\"", "engagement = \"fire\"", "rules.engagement", true),
     ("engagement = \"warn\"\n", "", "rules.engagement", true),

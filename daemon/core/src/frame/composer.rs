@@ -6,8 +6,8 @@ use glam::{DQuat, DVec3, Vec3};
 
 use super::{
     boats::{boats_in_view, nearest_m},
-    lamps::{FlashView, LAMPS_MAX, LampView, flares_in_view, flash_at, lamps_at, muzzle_px},
-    lights::lights_in_view,
+    lamps::{FlashView, LAMPS_MAX, LampView},
+    lights::{flares_in_view, flash_at, lamps_at, lights_in_view, muzzle_px},
     plan::{InView, SceneNeeds, ScenePlan, sea_reflects},
     rounds::{ROUNDS_SEEN_MAX, rounds_in_view},
     scene::{BoatView, Hud, LightView, Pass, RoundView, Scene, Status},
