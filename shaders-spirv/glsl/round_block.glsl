@@ -3,7 +3,7 @@ struct RoundBlock {
     vec4 from;        // one end of the axis: pixels, depth (near / distance), reach before and behind that, metres
     vec4 to;          // the other end
     vec4 colour;      // linear light and opacity, or optical depth
-    vec2 half_width;  // at both ends, pixels
+    vec2 half_width;  // at both ends, pixels; of smoke the second is the radius at which it ends, half widths
     uint kind;        // ROUND_*
     float seed;       // tells one from another
 };

@@ -391,7 +391,7 @@ block! {
         pub to: [f32; 4],
         /// Linear light and opacity, or optical depth.
         pub colour: [f32; 4],
-        /// Half widths at both ends, pixels.
+        /// Half widths at both ends, pixels; of smoke the second is the radius at which it ends, half widths.
         pub half_width: [f32; 2],
         /// What it is: one of the `ROUND_` constants.
         pub kind: u32,

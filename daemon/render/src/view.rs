@@ -4,7 +4,7 @@
 use bowwave_core::{
     estimate::light::Light,
     frame::{
-        lamps::LampView,
+        lamps::{LAMPS_MAX, LampView},
         scene::{BoatView, Scene},
         view::NEAR_M,
     },
@@ -159,22 +159,16 @@ pub(crate) fn boat_block(
 /// Places and lights of the lamps that light a boat most, in its space.
 fn lamps_on(scene: &Scene, pose: &RigidPose) -> ([[f32; 4]; BOAT_LAMPS], [[f32; 4]; BOAT_LAMPS]) {
     let (mut places, mut lights) = ([[0.0; 4]; BOAT_LAMPS], [[0.0; 4]; BOAT_LAMPS]);
-    let strength = |lamp: &LampView| lamp.matt_at(pose.position).max_element();
-    let mut count = 0;
-    for lamp in &scene.lamps {
-        // Insertion: the brightest stay.
-        let place = (0..count).find(|i| strength(lamp) > lights[*i][3]).unwrap_or(count);
-        if place == BOAT_LAMPS {
-            continue;
-        }
-        places[place..].rotate_right(1);
-        lights[place..].rotate_right(1);
-        let from_lamp = pose.world_from_body.inverse() * (lamp.at - pose.position);
-        places[place] = from_lamp.extend(0.0).as_vec4().to_array();
-        let air = (-lamp.extinction_per_m * from_lamp.length()).exp() as f32;
-        let matt = lamp.strength * (std::f32::consts::FRAC_1_PI * air);
-        lights[place] = matt.extend(strength(lamp)).to_array();
-        count = (count + 1).min(BOAT_LAMPS);
+    let mut brightest: [Option<&LampView>; LAMPS_MAX] = [None; LAMPS_MAX];
+    brightest.iter_mut().zip(&scene.lamps).for_each(|(slot, lamp)| *slot = Some(lamp));
+    let brightness =
+        |lamp: &Option<&LampView>| lamp.map_or(-1.0, |lamp| lamp.matt_at(pose.position).max_element());
+    brightest.sort_unstable_by(|a, b| brightness(b).total_cmp(&brightness(a)));
+    for ((place, light), lamp) in places.iter_mut().zip(&mut lights).zip(brightest.iter().flatten()) {
+        let lamp_in_boat = pose.world_from_body.inverse() * (lamp.at - pose.position);
+        let air = (-lamp.extinction_per_m * lamp_in_boat.length()).exp() as f32;
+        *place = lamp_in_boat.extend(0.0).as_vec4().to_array();
+        *light = (lamp.strength * (std::f32::consts::FRAC_1_PI * air)).extend(0.0).to_array();
     }
     (places, lights)
 }

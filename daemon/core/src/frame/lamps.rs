@@ -4,10 +4,11 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::{DVec3, Vec3};
 
+use crate::physics::illuminance;
+
 /// Most lamps of a scene; of more, the first fires and the newest flares.
 pub const LAMPS_MAX: usize = 8;
-/// Nearer than this a lamp is no point, metres.
-const NEAREST_M: f64 = 1.0;
+
 /// A lamp in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LampView {
@@ -24,22 +25,20 @@ pub struct LampView {
 impl LampView {
     /// Radiance of a white matt surface at `place` (world) that faces it, white in the picture being 1.
     pub fn matt_at(&self, place: DVec3) -> Vec3 {
-        let range_m = self.at.distance(place).max(NEAREST_M);
-        let air = (-self.extinction_per_m * range_m).exp();
-        self.strength * (FRAC_1_PI * air / (range_m * range_m)) as f32
+        let lux = illuminance(1.0, self.at.distance(place), self.extinction_per_m);
+        self.strength * (FRAC_1_PI * lux) as f32
     }
 
     /// The same of one that lies flat.
     pub fn flat_at(&self, place: DVec3) -> Vec3 {
-        let towards = self.at - place;
-        let sine = (towards.z / towards.length().max(NEAREST_M)).max(0.0);
+        let sine = (self.at - place).normalize_or_zero().z.max(0.0);
         self.matt_at(place) * sine as f32
     }
 }
 
 /// Radiance of a small white body at `place` (world), as `lamps` light it: a sphere shows a quarter of what it would facing the lamp.
-pub fn body_at(lamps: &[LampView], place: DVec3) -> Vec3 {
-    lamps.iter().map(|lamp| lamp.matt_at(place) * 0.25).sum()
+pub fn body_at<'a>(lamps: impl IntoIterator<Item = &'a LampView>, place: DVec3) -> Vec3 {
+    lamps.into_iter().map(|lamp| lamp.matt_at(place) * 0.25).sum()
 }
 
 /// Radiance of white foam at `place` (world).

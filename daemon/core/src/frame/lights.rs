@@ -144,7 +144,7 @@ pub(super) fn flash_at(
     Some(FlashView { on_gun: strength * (FRAC_1_PI * mean) as f32 })
 }
 
-/// Where the muzzle is seen: the corner of what recoils nearest to where the bore vanishes; `None` where nothing is known to recoil.
+/// Pixel of the muzzle: the corner of what recoils nearest to where the bore vanishes; `None` where nothing is known to recoil.
 pub(super) fn muzzle_px<'a>(recoiling: impl Iterator<Item = &'a [DVec2]>, bore: DVec2) -> Option<DVec2> {
     recoiling.flatten().min_by(|a, b| a.distance_squared(bore).total_cmp(&b.distance_squared(bore))).copied()
 }

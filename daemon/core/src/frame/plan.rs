@@ -100,6 +100,8 @@ impl SceneNeeds {
             water.force = BeaufortForce::of_wind(0.0);
         }
         let burns = scenario.boats.iter().any(|boat| boat.burns_at_s.is_some());
+        // A fire, which rounds may light too, or a flare.
+        let shines = burns || scenario.weapon.belt > 0 || scenario.exercise.has_flares();
         Self {
             size: (0, 0),
             video: PixelFormat::Rgb,
@@ -110,14 +112,8 @@ impl SceneNeeds {
             moving: scenario.boats.iter().filter(|b| b.behaviour.speed_max_m_s() > 0.0).count(),
             belt: scenario.weapon.belt,
             burns,
-            lights: burns
-                || scenario.weapon.belt > 0
-                || scenario.exercise.has_flares()
-                || scenario.boats.iter().any(|b| b.lights != LightsKept::None),
-            lamps: burns
-                || scenario.searchlight.is_some()
-                || scenario.weapon.belt > 0
-                || scenario.exercise.has_flares(),
+            lights: shines || scenario.boats.iter().any(|b| b.lights != LightsKept::None),
+            lamps: shines || scenario.searchlight.is_some(),
             sun_stays_up: scenario.daylight.stays_up(),
             sun_stays_down: scenario.daylight.stays_down(),
             phantoms: Phantoms::default(),

@@ -74,7 +74,7 @@ impl Scene {
         self.passes[pass as usize] == PassDecision::Run
     }
 
-    /// What lights the sea and the air.
+    /// The lamps that light sea and air.
     pub fn lamplight(&self) -> Lamplight<'_> {
         let searchlight = self.searchlight.as_ref();
         Lamplight { searchlight, lamps: &self.lamps, wind_m_s: self.wind.length() }

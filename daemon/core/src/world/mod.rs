@@ -9,6 +9,7 @@ pub mod exercise;
 pub mod flare;
 pub mod fleet;
 pub mod gunnery;
+mod note_clock;
 pub mod rounds;
 pub mod scenario;
 pub mod score;

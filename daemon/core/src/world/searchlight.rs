@@ -6,8 +6,9 @@ use glam::DVec3;
 
 use crate::{
     daylight::{Daylight, illuminance_of_sun},
-    physics::extinction_per_m,
+    physics::{extinction_per_m, illuminance},
     time::Time,
+    world::note_clock::NoteClock,
 };
 
 /// A searchlight beside the gun, whose axis is the barrel's.
@@ -80,11 +81,8 @@ impl Searchlight {
 
     /// Illuminance by it of a surface at `at` that faces it, lux.
     pub fn illuminance(&self, beam: &Beam, at: DVec3) -> f64 {
-        /// Nearer than this it is no point, metres.
-        const NEAREST_M: f64 = 1.0;
-        let range_m = at.distance(beam.lamp).max(NEAREST_M);
-        self.spec.candela_at(off_axis(beam, at)) * (-self.extinction_per_m * range_m).exp()
-            / (range_m * range_m)
+        let range_m = at.distance(beam.lamp);
+        illuminance(self.spec.candela_at(off_axis(beam, at)), range_m, self.extinction_per_m)
     }
 
     /// The beam is this from `time_s` on.
@@ -130,14 +128,18 @@ pub struct LightSwitch {
     is_on: bool,
     /// Presses that lie ahead of what was noted, oldest first.
     pressed: VecDeque<Time>,
-    /// Number of the next note.
-    noted: u32,
+    clock: NoteClock,
 }
 
 impl LightSwitch {
     /// A switch that nobody has pressed.
     pub const fn new(spec: SearchlightSpec) -> Self {
-        Self { spec, is_on: spec.is_on, pressed: VecDeque::new(), noted: 0 }
+        Self {
+            spec,
+            is_on: spec.is_on,
+            pressed: VecDeque::new(),
+            clock: NoteClock::new(NOTED_EVERY_S, KEPT as u32),
+        }
     }
 
     /// It is pressed; of more presses at once than anybody makes, the later ones do not count.
@@ -153,14 +155,7 @@ impl LightSwitch {
     /// When the beam is to be noted next, and whether it is on then; `None` once it has been noted up to `now`. The scenario began at
     /// `start`.
     pub fn next_note(&mut self, start: Time, now: Time) -> Option<(Time, bool)> {
-        let newest = (now.secs_since(start) / NOTED_EVERY_S).floor();
-        if newest < f64::from(self.noted) {
-            return None;
-        }
-        // After a stop, what was before it lights nobody any more.
-        self.noted = self.noted.max((newest as u32).saturating_sub(KEPT as u32));
-        let time = start.plus_secs(f64::from(self.noted) * NOTED_EVERY_S);
-        self.noted += 1;
+        let time = self.clock.next(start, now)?;
         while self.pressed.front().is_some_and(|pressed| *pressed <= time) {
             self.pressed.pop_front();
             self.is_on = !self.is_on;

@@ -138,18 +138,19 @@ impl RunningWorld {
 
     /// The event that a round was fired.
     fn fired(&self, shot: u64, time: Time, aim: &BoreAim) -> ExerciseEvent {
-        let boats = self.watched(Some(aim), aim.muzzle);
+        let boats = self.watched(Some(aim), None);
         let at = pointed_at(&boats).and_then(|boat| boats.get(boat));
         let (boat, range_m) = (at.map(|b| b.name.to_owned()), at.map(|b| b.range_m));
         ExerciseEvent { time, fact: ExerciseFact::Fired { shot, boat, range_m } }
     }
 
-    /// All boats, for whoever watches the exercise, as an eye at `watcher` has them, while the barrel points as `aim` says, if that is known.
-    fn watched(&self, aim: Option<&BoreAim>, watcher: DVec3) -> Vec<WatchedBoat<'_>> {
+    /// All boats, for whoever watches the exercise, while the barrel points as `aim` says, if that is known; where an eye at `watcher` looks at them,
+    /// with the chances that it sees each.
+    fn watched(&self, aim: Option<&BoreAim>, watcher: Option<DVec3>) -> Vec<WatchedBoat<'_>> {
         let aim = aim.filter(|aim| aim.unscored.is_none());
         let Self { fleet, now, .. } = self;
         let eye = aim.map_or(DVec3::ZERO, |aim| aim.muzzle);
-        let seen = fleet.seen_from(watcher, *now);
+        let seen = watcher.map_or_else(Vec::new, |eye| fleet.seen_from(eye, *now));
         let watched = |boat: usize| {
             let at = fleet.middle(boat, *now)?;
             let speed_m_s = fleet.history(boat)?.state(now.secs_since(self.start)).velocity().length();
@@ -342,7 +343,7 @@ impl World {
     fn watch_exercise(&mut self, running: &mut RunningWorld, aim: BoreAim) {
         running.note_ends(&mut self.events);
         self.count_fragments();
-        let boats = running.watched(Some(&aim), DVec3::Z * self.eye_m);
+        let boats = running.watched(Some(&aim), Some(DVec3::Z * self.eye_m));
         let orders = self.watch.follow(running.now, &boats, self.weapon.rounds_in_all(), &mut self.events);
         for boat in orders.warned {
             running.fleet.warn(boat, running.now);
@@ -395,7 +396,7 @@ impl World {
     pub fn finish(&mut self, records: &mut Vec<ShotRecord>) {
         self.events.clear();
         if let Some(running) = &mut self.running {
-            let boats = running.watched(None, DVec3::Z * self.eye_m);
+            let boats = running.watched(None, None);
             let mut ended = Vec::new();
             self.watch.finish(running.now, &boats, self.weapon.rounds_in_all(), &mut ended);
             let RunningWorld { start, now, fleet, rounds, .. } = running;

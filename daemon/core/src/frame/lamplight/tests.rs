@@ -1,3 +1,5 @@
+use std::f64::consts::PI;
+
 use super::*;
 use crate::{frame::searchlight::SearchlightView, geometry::look, world::searchlight::SearchlightSpec};
 
@@ -108,4 +110,3 @@ fn extremes_are_finite_and_never_negative() {
         }
     }
 }
-const PI: f64 = std::f64::consts::PI;

@@ -79,7 +79,7 @@ pub struct ExerciseWatch {
     is_decided: bool,
 }
 
-/// What the watch asks of weapon, crews and sky.
+/// Orders of the watch to weapon, crews and sky.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WatchOrders {
     /// Boats that were warned, by their numbers.

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::Fleet;
 use crate::{
     geometry::{ahead, starboard},
-    physics::extinction_per_m,
+    physics::{extinction_per_m, illuminance},
     time::Time,
     world::{
         boats::{CourseState, FIRE_CANDELA_KW, Traffic, fire_heat_kw},
@@ -22,8 +22,8 @@ const SHIP_BREADTH_M: f64 = 24.0;
 const EYES_LEAST_M: f64 = 1.2;
 
 impl Fleet {
-    /// How many times the contrast, or the light, of each boat at `time` is what half of the glimpses of somebody at `eye` need who looks at
-    /// it: world, metres. 0 for what is hidden or has sunk.
+    /// Contrast, or light, of each boat at `time` over what half of the glimpses of somebody at `eye` need who looks at it: world, metres. 0 for
+    /// what is hidden or has sunk.
     pub fn seen_from(&self, eye: DVec3, time: Time) -> Vec<f64> {
         let time_s = time.secs_since(self.start);
         let traffic: Vec<Traffic> = self.traffic(time_s).collect();
@@ -47,13 +47,8 @@ impl Fleet {
 
     /// Illuminance by flares of what faces them at `at`, lux.
     fn flares_lux(&self, at: DVec3, time: Time) -> f64 {
-        /// Nearer than this a flare is no point, metres.
-        const NEAREST_M: f64 = 1.0;
         let air = self.seeing(time).map_or(0.0, |seeing| extinction_per_m(seeing.visibility_m));
-        let lux = |flare: &Flare| {
-            let range_m = flare.at(time)?.distance(at).max(NEAREST_M);
-            Some(flare.candela(time) * (-air * range_m).exp() / (range_m * range_m))
-        };
+        let lux = |flare: &Flare| Some(illuminance(flare.candela(time), flare.at(time)?.distance(at), air));
         self.flares.iter().filter_map(lux).sum()
     }
 

@@ -8,6 +8,7 @@ use crate::{
     estimate::light::{Luminaries, SkyClock},
     event::ShipFix,
     time::Time,
+    world::note_clock::NoteClock,
 };
 
 /// Interval at which the light is noted, seconds.
@@ -52,14 +53,18 @@ pub struct SceneLight {
     sky: SkyClock,
     daylight: Daylight,
     wind_m_s: f64,
-    /// Number of the next note.
-    noted: u32,
+    clock: NoteClock,
 }
 
 impl SceneLight {
     /// Light before a scenario of that daylight and wind begins.
     pub const fn new(daylight: &Daylight, wind_m_s: f64) -> Self {
-        Self { sky: SkyClock::new(daylight), daylight: *daylight, wind_m_s, noted: 0 }
+        Self {
+            sky: SkyClock::new(daylight),
+            daylight: *daylight,
+            wind_m_s,
+            clock: NoteClock::new(NOTED_EVERY_S, KEPT as u32),
+        }
     }
 
     /// Takes in place and time that the ship's instruments told.
@@ -77,14 +82,7 @@ impl SceneLight {
 
     /// The next light to note, with its time; `None` once it has been noted up to `now`. The scenario began at `start`.
     pub fn next_note(&mut self, start: Time, now: Time) -> Option<(Time, Seeing)> {
-        let newest = (now.secs_since(start) / NOTED_EVERY_S).floor();
-        if newest < f64::from(self.noted) {
-            return None;
-        }
-        // After a stop, only the last notes matter.
-        self.noted = self.noted.max((newest as u32).saturating_sub(KEPT as u32));
-        let time = start.plus_secs(f64::from(self.noted) * NOTED_EVERY_S);
-        self.noted += 1;
+        let time = self.clock.next(start, now)?;
         Some((time, self.at(time)))
     }
 }

@@ -61,7 +61,7 @@ impl Seeing {
         Self { ambient: Ambient::new(DVec3::Z, 1.0, None, 5.0), visibility_m: 20_000.0 }
     }
 
-    /// How many times its contrast, or its light, is what half of the glimpses of an alert watcher at `eye` need who looks at it; `at` is its
+    /// Its contrast, or its light, over what half of the glimpses of an alert watcher at `eye` need who looks at it; `at` is its
     /// waterline. World, metres. 0 for what the horizon or haze hides altogether.
     pub fn times_threshold(&self, eye: DVec3, at: DVec3, target: &Target, glare: Glare) -> f64 {
         let flat = (at - eye).truncate();
@@ -155,7 +155,7 @@ struct Shown {
 }
 
 impl Shown {
-    /// What an eye `eye_m` over the sea has of a vessel `height_m` high; `None` where that is nothing.
+    /// The part that an eye `eye_m` over the sea has of a vessel `height_m` high; `None` where that is nothing.
     fn of(eye_m: f64, range_m: f64, height_m: f64) -> Option<Self> {
         let eye_m = eye_m.max(0.0);
         let beyond_m = range_m - horizon_distance(eye_m);

@@ -2,15 +2,12 @@
 
 use std::f64::consts::FRAC_1_PI;
 
-use bowwave_core::{
-    frame::{
-        lamplight::{LightGrid, NodeLight},
-        lamps::{LAMPS_MAX, LampView, foam_at},
-        scene::{PixelRect, Scene},
-        searchlight::SEA_ALBEDO,
-        view::clip_to_screen,
-    },
-    physics::haze_share,
+use bowwave_core::frame::{
+    lamplight::{LightGrid, NodeLight},
+    lamps::{LAMPS_MAX, LampView, foam_at},
+    scene::{PixelRect, Scene},
+    searchlight::SEA_ALBEDO,
+    view::clip_to_screen,
 };
 use glam::{DVec2, DVec3, Vec3};
 use shaders_spirv::interface::{LamplightBlock, LamplightNode, PoolBlock};
@@ -127,7 +124,7 @@ fn pool(scene: &Scene, lamp: &LampView) -> Option<Pool> {
     let foot = lamp.at.with_z(0.0);
     let height_m = lamp.at.z.max(0.3);
     let range_m = camera.position.distance(foot);
-    let air = 1.0 - haze_share(range_m, 3.912 / lamp.extinction_per_m.max(1e-9));
+    let air = (-lamp.extinction_per_m * range_m).exp() as f32;
     let light = lamp.strength * SEA_ALBEDO * (FRAC_1_PI as f32 * air);
     let strength = f64::from(light.max_element());
     let reach_m = (strength * height_m / f64::from(LEAST)).cbrt().min(POOL_MOST_M).min(POOL_SHARE * range_m);

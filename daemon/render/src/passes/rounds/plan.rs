@@ -57,9 +57,9 @@ pub(crate) fn round_block(scene: &Scene, round: &RoundView, seed: f32) -> Option
             // Farther out it hides less than a hundredth; the shader lets it end there.
             let reach = f64::from((depth.max(0.0) / SMOKE_LEAST).max(1.2)).ln().sqrt().min(SMOKE_ENDS);
             let light = &scene.light;
-            let high = scene.lamps.iter().filter(|lamp| lamp.is_high).map(|lamp| lamp.matt_at(at) * 0.25);
-            let around = light.sun * 0.25 + light.sky * 0.7 + light.sea * 0.3 + high.sum::<Vec3>();
             // Flames light their own smoke from below: the puff knows.
+            let flares = body_at(scene.lamps.iter().filter(|lamp| lamp.is_high), at);
+            let around = light.sun * 0.25 + light.sky * 0.7 + light.sea * 0.3 + flares;
             let lit = around * SOOT_ALBEDO as f32 + glow;
             Shape {
                 ends: [at, at],
