@@ -38,7 +38,7 @@ pub struct Cutout {
     /// Left upper corner of the part, pixels of the picture.
     corner: [u32; 2],
     size: [u32; 2],
-    /// Where the pixels in question begin within the part, and how many they are across and down.
+    /// First of the pixels in question within the part, and their number across and down.
     inset: [u32; 2],
     inner: [u32; 2],
 }

@@ -10,6 +10,7 @@ mod colour;
 mod cut;
 mod depth;
 mod drawn;
+mod drawn_boat;
 mod driving;
 mod flight;
 mod fresnel;

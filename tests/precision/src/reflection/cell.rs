@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use bowwave_core::{
-    colour::{LUMINANCE, srgb_to_linear},
+    colour::LUMINANCE,
     estimate::light::Light,
     geometry::{CameraPose, Lens, RigidPose},
     sky::SkyLobes,
@@ -196,11 +196,10 @@ impl TruthCell {
     pub fn renewed(&self) -> Result<RgbImage> {
         let other = Self::render(&CellSpec { noise_seed: self.spec.noise_seed + 1, ..self.spec.clone() })?;
         ensure!(other.size() == self.size(), "{}: rendered again it has another size", self.name);
-        let linear = |code: u8| srgb_to_linear(f32::from(code) / 255.0);
         let mut drawn = self.without.clone();
         let pixels = drawn.iter_mut().zip(other.without.iter()).zip(other.with.iter());
         for ((code, without), with) in pixels {
-            *code = files::code(linear(*code) + linear(*with) - linear(*without));
+            *code = files::code(files::linear(*code) + files::linear(*with) - files::linear(*without));
         }
         Ok(drawn)
     }
@@ -239,7 +238,7 @@ pub struct CellErrors {
 
 /// Linear luminance of a pixel of sRGB codes.
 pub fn luminance(p: &Rgb<u8>) -> f64 {
-    f64::from(Vec3::from_array(p.0.map(|c| srgb_to_linear(f32::from(c) / 255.0))).dot(LUMINANCE))
+    f64::from(Vec3::from_array(p.0.map(files::linear)).dot(LUMINANCE))
 }
 
 fn between(sky: &[(f64, Vec3)], degrees: f64) -> Vec3 {

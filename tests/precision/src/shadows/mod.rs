@@ -95,6 +95,23 @@ const PCF: &str = "one map, PCF";
 const CASCADES: &str = "cascaded maps";
 const ZGAF: &str = "Z-GaF maps";
 
+const PLAIN_1024: NamedMethod =
+    NamedMethod::new(PLAIN, "1024 x 1024", || Box::new(whole::WholeMap::new(1024, 1)));
+const PLAIN_2048: NamedMethod =
+    NamedMethod::new(PLAIN, "2048 x 2048", || Box::new(whole::WholeMap::new(2048, 1)));
+const PCF_1024: NamedMethod =
+    NamedMethod::new(PCF, "1024 x 1024, 3 x 3 texels", || Box::new(whole::WholeMap::new(1024, 3)));
+const PCF_2048: NamedMethod =
+    NamedMethod::new(PCF, "2048 x 2048, 3 x 3 texels", || Box::new(whole::WholeMap::new(2048, 3)));
+const CASCADES_1024: NamedMethod =
+    NamedMethod::new(CASCADES, "four of 1024 x 1024", || Box::new(cascades::Cascades::new(1024)));
+const CASCADES_2048: NamedMethod =
+    NamedMethod::new(CASCADES, "four of 2048 x 2048", || Box::new(cascades::Cascades::new(2048)));
+const ZGAF_1024: NamedMethod =
+    NamedMethod::new(ZGAF, "1024 x 1024", || Box::new(zgaf::ZGaf::new(1024, zgaf::Layers::Fitted)));
+const ZGAF_2048: NamedMethod =
+    NamedMethod::new(ZGAF, "2048 x 2048", || Box::new(zgaf::ZGaf::new(2048, zgaf::Layers::Fitted)));
+
 /// All methods; the first is the product's.
 pub const METHODS: &[NamedMethod] = &[
     NamedMethod::new(TIGHT, "1024 x 1024, 2 x 2 texels", || Box::new(tight::TightMaps::new(1024, 1.0))),
@@ -108,20 +125,20 @@ pub const METHODS: &[NamedMethod] = &[
     })
     .at_four_points(),
     NamedMethod::new("no shadow", "", || Box::new(NoShadow)),
-    NamedMethod::new(PLAIN, "1024 x 1024", || Box::new(whole::WholeMap::new(1024, 1))),
-    NamedMethod::new(PLAIN, "2048 x 2048", || Box::new(whole::WholeMap::new(2048, 1))).dear(),
-    NamedMethod::new(PCF, "1024 x 1024, 3 x 3 texels", || Box::new(whole::WholeMap::new(1024, 3))),
-    NamedMethod::new(PCF, "2048 x 2048, 3 x 3 texels", || Box::new(whole::WholeMap::new(2048, 3))).dear(),
+    PLAIN_1024,
+    PLAIN_2048.dear(),
+    PCF_1024,
+    PCF_2048.dear(),
     NamedMethod::new(CASCADES, "four of 512 x 512", || Box::new(cascades::Cascades::new(512))),
-    NamedMethod::new(CASCADES, "four of 1024 x 1024", || Box::new(cascades::Cascades::new(1024))).dear(),
+    CASCADES_1024.dear(),
     NamedMethod::new(ZGAF, "1024 x 1024, as printed", || {
         Box::new(zgaf::ZGaf::new(1024, zgaf::Layers::Apart))
     }),
-    NamedMethod::new(ZGAF, "1024 x 1024", || Box::new(zgaf::ZGaf::new(1024, zgaf::Layers::Fitted))),
-    NamedMethod::new(ZGAF, "2048 x 2048", || Box::new(zgaf::ZGaf::new(2048, zgaf::Layers::Fitted))).dear(),
-    NamedMethod::new("variance map", "1024 x 1024", || Box::new(moments::VarianceMap::new(1024))),
-    NamedMethod::new("moment map", "1024 x 1024", || Box::new(moments::MomentMap::new(1024))),
-    NamedMethod::new("moment map", "2048 x 2048", || Box::new(moments::MomentMap::new(2048))).dear(),
+    ZGAF_1024,
+    ZGAF_2048.dear(),
+    NamedMethod::new("variance map", "1024 x 1024", || Box::new(moments::MomentMap::<2>::new(1024))),
+    NamedMethod::new("moment map", "1024 x 1024", || Box::new(moments::MomentMap::<4>::new(1024))),
+    NamedMethod::new("moment map", "2048 x 2048", || Box::new(moments::MomentMap::<4>::new(2048))).dear(),
     NamedMethod::new("moment map a boat", "1024 x 1024", || Box::new(moments::MomentMaps::new(1024))),
     NamedMethod::new("shadow volumes", "depth-fail, to infinity", || {
         Box::new(volumes::ShadowVolumes::new(volumes::Counting::DepthFail))
@@ -138,50 +155,8 @@ pub const METHODS: &[NamedMethod] = &[
 /// Methods of Kolivand and Sunar's Table 1 in its order, and frames a second as printed, at its two resolutions; each cascade has as many texels as the one
 /// map.
 pub const TABLE_1: [(usize, [(NamedMethod, f64); 4]); 2] = [
-    (
-        1024,
-        [
-            (NamedMethod::new(PLAIN, "1024 x 1024", || Box::new(whole::WholeMap::new(1024, 1))), 122.0),
-            (
-                NamedMethod::new(PCF, "1024 x 1024, 3 x 3 texels", || {
-                    Box::new(whole::WholeMap::new(1024, 3))
-                }),
-                75.0,
-            ),
-            (
-                NamedMethod::new(CASCADES, "four of 1024 x 1024", || Box::new(cascades::Cascades::new(1024))),
-                84.0,
-            ),
-            (
-                NamedMethod::new(ZGAF, "1024 x 1024", || {
-                    Box::new(zgaf::ZGaf::new(1024, zgaf::Layers::Fitted))
-                }),
-                96.0,
-            ),
-        ],
-    ),
-    (
-        2048,
-        [
-            (NamedMethod::new(PLAIN, "2048 x 2048", || Box::new(whole::WholeMap::new(2048, 1))), 116.0),
-            (
-                NamedMethod::new(PCF, "2048 x 2048, 3 x 3 texels", || {
-                    Box::new(whole::WholeMap::new(2048, 3))
-                }),
-                63.0,
-            ),
-            (
-                NamedMethod::new(CASCADES, "four of 2048 x 2048", || Box::new(cascades::Cascades::new(2048))),
-                79.0,
-            ),
-            (
-                NamedMethod::new(ZGAF, "2048 x 2048", || {
-                    Box::new(zgaf::ZGaf::new(2048, zgaf::Layers::Fitted))
-                }),
-                90.0,
-            ),
-        ],
-    ),
+    (1024, [(PLAIN_1024, 122.0), (PCF_1024, 75.0), (CASCADES_1024, 84.0), (ZGAF_1024, 96.0)]),
+    (2048, [(PLAIN_2048, 116.0), (PCF_2048, 63.0), (CASCADES_2048, 79.0), (ZGAF_2048, 90.0)]),
 ];
 
 /// Nothing stands in the sun's light.

@@ -13,18 +13,36 @@ use super::{
 const NEARER_TEXELS: f32 = 1.0;
 
 /// A map of all meshes, with `N` moments of the depth.
-struct Moments<const N: usize> {
+pub struct MomentMap<const N: usize> {
     side: usize,
     map: DepthMap,
     texels: MomentTexels<N>,
+    /// Share of the sun of what lies at a depth, by the moments there.
+    share: fn([f32; N], f32) -> f32,
 }
 
-impl<const N: usize> Moments<N> {
-    fn new(side: usize) -> Self {
-        Self { side, map: DepthMap::with_room(side, side), texels: MomentTexels::default() }
+impl<const N: usize> MomentMap<N> {
+    fn with(side: usize, share: fn([f32; N], f32) -> f32) -> Self {
+        Self { side, map: DepthMap::with_room(side, side), texels: MomentTexels::default(), share }
     }
+}
 
-    fn prepare(&mut self, frame: &ShadowFrame<'_>) {
+impl MomentMap<2> {
+    /// Mean and mean square in a map of `side` by `side` texels: a variance map.
+    pub fn new(side: usize) -> Self {
+        Self::with(side, chebyshev)
+    }
+}
+
+impl MomentMap<4> {
+    /// Four moments in a map of `side` by `side` texels.
+    pub fn new(side: usize) -> Self {
+        Self::with(side, lit_by_hamburger)
+    }
+}
+
+impl<const N: usize> ShadowMethod for MomentMap<N> {
+    fn prepare(&mut self, frame: &ShadowFrame<'_>, _: &SeenPoints) {
         let axes = slices::axes(frame);
         let around = axes.around(frame.meshes.iter().flat_map(|mesh| mesh.corners));
         self.map.fit(axes, &around, [self.side; 2]);
@@ -32,10 +50,8 @@ impl<const N: usize> Moments<N> {
         self.texels.take(&self.map, &around);
     }
 
-    /// Moments about a point, and its own depth.
-    fn at(&self, point: &SeenPoint) -> ([f32; N], f32) {
-        let at = self.map.at(point.place + point.normal * (0.5 * self.map.texel_m()));
-        (self.texels.at(at), self.texels.depth(at.z + NEARER_TEXELS * self.map.texel_m()))
+    fn share(&self, point: &SeenPoint) -> f32 {
+        looked_up(&self.map, &self.texels, point, self.share)
     }
 
     fn bytes(&self) -> usize {
@@ -43,56 +59,27 @@ impl<const N: usize> Moments<N> {
     }
 }
 
-/// Mean and mean square of the depth; the share of the sun by Chebyshev's inequality.
-pub struct VarianceMap(Moments<2>);
-
-impl VarianceMap {
-    /// A map of `side` by `side` texels.
-    pub fn new(side: usize) -> Self {
-        Self(Moments::new(side))
-    }
+/// Share of the sun at a point by the moments about it and its own depth.
+fn looked_up<const N: usize>(
+    map: &DepthMap,
+    texels: &MomentTexels<N>,
+    point: &SeenPoint,
+    share: fn([f32; N], f32) -> f32,
+) -> f32 {
+    let at = map.at(point.place + point.normal * (0.5 * map.texel_m()));
+    share(texels.at(at), texels.depth(at.z + NEARER_TEXELS * map.texel_m()))
 }
 
-impl ShadowMethod for VarianceMap {
-    fn prepare(&mut self, frame: &ShadowFrame<'_>, _: &SeenPoints) {
-        self.0.prepare(frame);
-    }
-
-    fn share(&self, point: &SeenPoint) -> f32 {
-        let ([mean, square], depth) = self.0.at(point);
-        let variance = (square - mean * mean).max(1e-7);
-        let behind = depth - mean;
-        if behind <= 0.0 { 1.0 } else { variance / (variance + behind * behind) }
-    }
-
-    fn bytes(&self) -> usize {
-        self.0.bytes()
-    }
+/// Share of the sun by Chebyshev's inequality.
+fn chebyshev([mean, square]: [f32; 2], depth: f32) -> f32 {
+    let variance = (square - mean * mean).max(1e-7);
+    let behind = depth - mean;
+    if behind <= 0.0 { 1.0 } else { variance / (variance + behind * behind) }
 }
 
-/// Four moments of the depth.
-pub struct MomentMap(Moments<4>);
-
-impl MomentMap {
-    /// A map of `side` by `side` texels.
-    pub fn new(side: usize) -> Self {
-        Self(Moments::new(side))
-    }
-}
-
-impl ShadowMethod for MomentMap {
-    fn prepare(&mut self, frame: &ShadowFrame<'_>, _: &SeenPoints) {
-        self.0.prepare(frame);
-    }
-
-    fn share(&self, point: &SeenPoint) -> f32 {
-        let (moments, depth) = self.0.at(point);
-        1.0 - hamburger(moments.map(f64::from), f64::from(depth)) as f32
-    }
-
-    fn bytes(&self) -> usize {
-        self.0.bytes()
-    }
+/// Share of the sun by four moments.
+fn lit_by_hamburger(moments: [f32; 4], depth: f32) -> f32 {
+    1.0 - hamburger(moments.map(f64::from), f64::from(depth)) as f32
 }
 
 /// Four moments of the depth in a map of each boat's own.
@@ -120,9 +107,7 @@ impl ShadowMethod for MomentMaps {
 
     fn share(&self, point: &SeenPoint) -> f32 {
         let Some((map, moments)) = self.maps.get(point.mesh as usize) else { return 1.0 };
-        let at = map.at(point.place + point.normal * (0.5 * map.texel_m()));
-        let depth = moments.depth(at.z + NEARER_TEXELS * map.texel_m());
-        1.0 - hamburger(moments.at(at).map(f64::from), f64::from(depth)) as f32
+        looked_up(map, moments, point, lit_by_hamburger)
     }
 
     fn bytes(&self) -> usize {

@@ -23,6 +23,11 @@ pub fn code(linear: f32) -> u8 {
     (coded * 255.0).round() as u8
 }
 
+/// An sRGB code as a linear value.
+pub fn linear(code: u8) -> f32 {
+    bowwave_core::colour::srgb_to_linear(f32::from(code) / 255.0)
+}
+
 /// A linear picture as sRGB bytes.
 pub fn coded(pixels: &[[f32; 3]]) -> Vec<u8> {
     pixels.iter().flat_map(|p| p.map(code)).collect()

@@ -3,7 +3,6 @@
 mod studio;
 
 use anyhow::Result;
-use glam::DVec3;
 
 use super::About;
 use crate::{
@@ -166,11 +165,4 @@ fn measure_extremes(
         bench.extreme(&format!("{}, 60 m", light.name), "FLIP", mean.listed());
     }
     Ok(())
-}
-
-/// Unit vector by elevation and azimuth clockwise from ahead, degrees.
-fn towards(elevation_deg: f64, azimuth_deg: f64) -> DVec3 {
-    let (up, level) = elevation_deg.to_radians().sin_cos();
-    let (right, ahead) = azimuth_deg.to_radians().sin_cos();
-    DVec3::new(level * right, level * ahead, up)
 }

@@ -1,43 +1,24 @@
 //! One boat as the product draws it, and as paths of light show it.
 
-use std::cell::RefCell;
-
 use anyhow::{Context as _, Result};
 use bowwave_core::{
-    colour::{linear_to_srgb, srgb_to_linear},
-    estimate::light::{Light, SeaTones},
-    event::Picture,
-    frame::scene::{LeftOut, Pass, PassDecision, Scene},
-    geometry::Lens,
-    model::Model,
-    sea::BeaufortForce,
+    estimate::light::Light,
+    frame::scene::{Pass, PassDecision, Scene},
     sky::SkyLobes,
-    water::ReflectionMethod,
 };
-use bowwave_models::resolve;
-use bowwave_render::SOFTWARE;
 use glam::{DVec2, Vec3};
 use image::{Rgb, RgbImage};
 
-use super::towards;
 use crate::{
     bench::ExtremeResult,
     metric::Cutout,
+    parts::drawn_boat::{self, DrawnBoat, SIZE, towards, without_shadow},
     path_traced::{Kind, TracedLight, TracedPicture, View},
-    reflection::{
-        draw::{Painter, picture},
-        scenes::{self, Afloats},
-    },
-    truth::boat,
+    reflection::{draw::picture, scenes::Afloats},
+    truth::{boat, files},
 };
 
-const SIZE: (u32, u32) = (1280, 720);
-/// Width of the view, degrees.
-const HFOV_DEG: f64 = 40.0;
-/// Height of the eye, metres.
-const EYE_M: f64 = 8.0;
-
-/// What the renderer draws: its names, the product's first.
+/// Names of the ways in which the renderer draws, the product's first.
 pub const WAYS: [&str; 3] = ["sky by lobes, baked; a map a boat", "no shadow", "even sky"];
 
 /// A light by its sky and where its sun stands.
@@ -79,7 +60,7 @@ pub struct Cell<'a> {
 
 impl Cell<'_> {
     fn afloat(&self) -> Afloats {
-        Afloats { heading_deg: self.heading_deg, roll_deg: 4.0, pitch_deg: 2.0, ..Afloats::at(self.range_m) }
+        drawn_boat::afloat(self.range_m, self.heading_deg)
     }
 }
 
@@ -142,62 +123,41 @@ impl HullErrors {
 type Linear = Vec<Vec3>;
 
 fn linear(picture: &RgbImage) -> Linear {
-    let of = |code: u8| srgb_to_linear(f32::from(code) / 255.0);
-    picture.pixels().map(|p| Vec3::new(of(p[0]), of(p[1]), of(p[2]))).collect()
+    picture.pixels().map(|p| Vec3::from_array(p.0.map(files::linear))).collect()
 }
 
 fn coded(light: &[Vec3], size: (u32, u32)) -> RgbImage {
     RgbImage::from_fn(size.0, size.1, |x, y| {
         let light = light[(y * size.0 + x) as usize].clamp(Vec3::ZERO, Vec3::ONE);
-        Rgb(light.to_array().map(|v| (linear_to_srgb(v) * 255.0).round() as u8))
+        Rgb(light.to_array().map(files::code))
     })
 }
 
-/// What draws one boat.
-pub struct HullStudio {
-    model: Model,
-    painter: RefCell<Painter>,
-    black: Picture,
-}
+/// What draws one boat, and what its light is held against.
+pub struct HullStudio(DrawnBoat);
 
 impl HullStudio {
     /// For a boat of that name.
     pub fn new(boat: &str) -> Result<Self> {
-        let mut model = resolve(boat, std::path::Path::new(""))?;
-        // Paths do not look at textures.
-        model.texture = None;
-        let painter = Painter::new(SIZE, std::slice::from_ref(&model), &[], (1, Some(SOFTWARE)))?;
-        Ok(Self { model, painter: RefCell::new(painter), black: picture(&RgbImage::new(SIZE.0, SIZE.1))? })
+        Ok(Self(DrawnBoat::new(boat)?))
     }
 
     fn scene(&self, cell: &Cell<'_>, light: Light) -> Result<Scene> {
-        let lens = Lens::pinhole(SIZE.0, SIZE.1, HFOV_DEG.to_radians());
-        let camera = scenes::camera(EYE_M, cell.range_m);
-        let calm = BeaufortForce::new(1).context("no such force")?;
-        let (tones, off) = (SeaTones::default(), (ReflectionMethod::Off, calm));
-        let mut scene = scenes::scene((camera, lens), tones, &self.model, &[cell.afloat()], off);
-        for pass in [Pass::Mirror, Pass::Water, Pass::Hud] {
-            scene.passes[pass as usize] = PassDecision::LeftOut(LeftOut::ReflectionOff);
-        }
-        scene.light = light;
-        scene.passes[Pass::Shadow as usize] =
-            if light.sun_shines() { PassDecision::Run } else { PassDecision::LeftOut(LeftOut::NoSun) };
-        Ok(scene)
+        self.0.scene(cell.range_m, cell.afloat(), light)
     }
 
     /// The scenes of [`WAYS`].
     pub fn scenes(&self, cell: &Cell<'_>) -> Result<[Scene; WAYS.len()]> {
         let light = cell.light.product();
         let product = self.scene(cell, light)?;
-        let mut bare = product.clone();
-        bare.passes[Pass::Shadow as usize] = PassDecision::LeftOut(LeftOut::NoSun);
+        let bare = without_shadow(&product);
         let even = self.scene(cell, Light { dome: SkyLobes::even(light.sky), ..light })?;
         Ok([product, bare, even])
     }
 
     /// Draws a scene over black.
     pub fn paint(&self, scene: &Scene) -> Result<RgbImage> {
-        self.painter.borrow_mut().paint(scene, &self.black)
+        self.0.paint(scene)
     }
 
     fn traced(
@@ -208,7 +168,7 @@ impl HullStudio {
         seed: u64,
     ) -> Result<(Cutout, TracedPicture)> {
         let within = scene.boats.first().and_then(|b| b.hull).context("the boat is out of the picture")?;
-        let mesh = boat::mesh(&self.model, cell.afloat().pose());
+        let mesh = boat::mesh(&self.0.model, cell.afloat().pose());
         let view = View { camera: &scene.camera, lens: &scene.lens, within };
         let traced = TracedPicture::new(&view, &mesh, cell.light, (paths, seed));
         Ok((Cutout::new([within.x, within.y], [within.width, within.height], [SIZE.0, SIZE.1]), traced))
@@ -240,7 +200,7 @@ impl HullStudio {
         };
         let mut pictures = Vec::new();
         for scene in &scenes {
-            pictures.push(cutout.cut(&self.painter.borrow_mut().paint(scene, &before)?));
+            pictures.push(cutout.cut(&self.0.paint_over(scene, &before)?));
         }
         let mut ways = [0.0; WAYS.len()];
         for (way, drawn) in ways.iter_mut().zip(&pictures) {
@@ -299,7 +259,7 @@ fn background(light: &TracedLight, scene: &Scene) -> RgbImage {
             let at = DVec2::new(0.5 * f64::from(SIZE.0), f64::from(y) + 0.5);
             let along = (scene.camera.world_from_camera * scene.lens.unproject(at)).normalize();
             let seen = if along.z > 0.0 { light.sky(along) } else { light.sea };
-            seen.clamp(Vec3::ZERO, Vec3::ONE).to_array().map(|v| (linear_to_srgb(v) * 255.0).round() as u8)
+            seen.clamp(Vec3::ZERO, Vec3::ONE).to_array().map(files::code)
         })
         .collect();
     RgbImage::from_fn(SIZE.0, SIZE.1, |_, y| Rgb(rows[y as usize]))

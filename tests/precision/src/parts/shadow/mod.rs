@@ -6,13 +6,16 @@ mod table;
 use anyhow::Result;
 use glam::DVec3;
 
-use super::About;
+use super::{
+    About,
+    drawn_boat::{towards, without_shadow},
+};
 use crate::{
     bench::{ExtremeResult, PartBench, Way},
     reflection::{cost::process_ms, scenes::Afloats},
     shadows::{FIVE_STAGES, FOUR_STAGES, METHODS, NamedMethod, Stage},
 };
-use studio::{CaseErrors, RANGES_M, Studio, Sunlit, sun, without_shadow};
+use studio::{CaseErrors, RANGES_M, Studio, Sunlit};
 
 /// Description of this part.
 pub const ABOUT: About = About {
@@ -69,7 +72,7 @@ fn cases(range: usize, scale: f64, headings: u32) -> Vec<Sunlit> {
         let share = (f64::from(n) + 0.5) / f64::from(headings);
         let elevation = 3.0 + 57.0 * (share * 7.0).fract();
         let azimuth = 360.0 * (share * 3.0 + 0.21).fract();
-        Sunlit { scale, range, heading_deg: 360.0 * share, sun: sun(elevation, azimuth) }
+        Sunlit { scale, range, heading_deg: 360.0 * share, sun: towards(elevation, azimuth) }
     };
     (0..headings).map(case).collect()
 }
@@ -113,7 +116,7 @@ fn measure_range(bench: &mut PartBench, fleet: &Fleet, range: usize) -> Result<(
         all.iter_mut().zip(errors).for_each(|(all, error)| *all += error / fleet.studios.len() as f64);
     }
     let Some((studio, _)) = fleet.studios.first() else { return Ok(()) };
-    let case = Sunlit { scale: 1.0, range, heading_deg: 70.0, sun: sun(30.0, 120.0) };
+    let case = Sunlit { scale: 1.0, range, heading_deg: 70.0, sun: towards(30.0, 120.0) };
     let scene = studio.scene(&case)?;
     let range_m = RANGES_M[range];
     let pictures = [scene.clone(), without_shadow(&scene)].into_iter().zip(DRAWN).zip(&all);
@@ -151,12 +154,12 @@ fn measure_range(bench: &mut PartBench, fleet: &Fleet, range: usize) -> Result<(
 fn measure_extremes(bench: &mut PartBench, fleet: &Fleet) -> Result<()> {
     let is_quick = bench.is_quick();
     for (name, sun, range, is_eye_shaded) in [
-        ("the sun behind the eye, light along the view, 60 m", sun(3.0, 180.0), 0, false),
-        ("the sun behind the eye, light along the view, 400 m", sun(3.0, 180.0), 2, false),
-        ("the sun ahead, light against the view", sun(3.0, 0.0), 0, false),
-        ("the sun on the horizon, abeam", sun(0.05, 90.0), 0, false),
+        ("the sun behind the eye, light along the view, 60 m", towards(3.0, 180.0), 0, false),
+        ("the sun behind the eye, light along the view, 400 m", towards(3.0, 180.0), 2, false),
+        ("the sun ahead, light against the view", towards(3.0, 0.0), 0, false),
+        ("the sun on the horizon, abeam", towards(0.05, 90.0), 0, false),
         ("the sun overhead", DVec3::Z, 0, false),
-        ("the eye within another boat's shadow", sun(9.0, 150.0), 0, true),
+        ("the eye within another boat's shadow", towards(9.0, 150.0), 0, true),
     ] {
         let mut worst = vec![0.0_f64; 2 + fleet.methods.len()];
         // The short form judges by the skiff, whose shells are open, and by one heading.

@@ -1,44 +1,28 @@
 //! A boat in the sun as the product draws it, as every rival would, and as rays to the sun's disc see it.
 
-use std::cell::RefCell;
-
 use anyhow::{Context as _, Result};
 use bowwave_core::{
-    colour::{linear_to_srgb, srgb_to_linear},
-    estimate::light::{Light, SeaTones},
-    event::Picture,
-    frame::scene::{LeftOut, Pass, PassDecision, PixelRect, Scene},
+    estimate::light::Light,
+    frame::scene::{PixelRect, Scene},
     geometry::{CameraPose, Lens},
-    model::Model,
-    sea::BeaufortForce,
     sky::SkyLobes,
-    water::ReflectionMethod,
 };
-use bowwave_models::resolve;
-use bowwave_render::SOFTWARE;
 use glam::{DVec2, DVec3, Vec3};
 use hw_sim::ocean::mesh::BoatMesh;
 use image::{Rgb, RgbImage};
 
 use crate::{
     metric::Cutout,
-    reflection::{
-        draw::{Painter, picture},
-        scenes::{self, Afloats},
-    },
+    parts::drawn_boat::{self, DrawnBoat, EYE_M, SIZE, without_shadow},
+    reflection::scenes::Afloats,
     shadows::{
         NamedMethod, ShadowEye, ShadowFrame,
         mesh::CasterMesh,
         seen::{SeenPoint, SeenPoints},
     },
-    truth::boat,
+    truth::{boat, files},
 };
 
-const SIZE: (u32, u32) = (1280, 720);
-/// Width of the view, degrees.
-const HFOV_DEG: f64 = 40.0;
-/// Height of the eye, metres.
-const EYE_M: f64 = 8.0;
 /// Ranges of the three boats of a scene, metres: one is judged, the others stand in the picture's other parts.
 pub const RANGES_M: [f64; 3] = [60.0, 150.0, 400.0];
 
@@ -61,12 +45,7 @@ impl Sunlit {
     }
 
     fn afloat(&self) -> Afloats {
-        Afloats {
-            heading_deg: self.heading_deg,
-            roll_deg: 4.0,
-            pitch_deg: 2.0,
-            ..Afloats::at(self.range_m())
-        }
+        drawn_boat::afloat(self.range_m(), self.heading_deg)
     }
 
     /// The other two boats, to the side where the sun is not, so that they never shade the one that is judged.
@@ -77,13 +56,6 @@ impl Sunlit {
             Afloats { right_m: aside * range_m, heading_deg: case.heading_deg + 50.0, ..Afloats::at(range_m) }
         })
     }
-}
-
-/// A direction by elevation and azimuth clockwise from ahead, degrees.
-pub fn sun(elevation_deg: f64, azimuth_deg: f64) -> DVec3 {
-    let (up, level) = elevation_deg.to_radians().sin_cos();
-    let (right, ahead) = azimuth_deg.to_radians().sin_cos();
-    DVec3::new(level * right, level * ahead, up)
 }
 
 /// Errors of a case, FLIP over the boat's pixels.
@@ -131,37 +103,18 @@ impl Staged {
 }
 
 /// Everything that draws a boat, and the rays that judge it.
-pub struct Studio {
-    model: Model,
-    painter: RefCell<Painter>,
-    black: Picture,
-}
+pub struct Studio(DrawnBoat);
 
 impl Studio {
     /// For a boat of that name.
     pub fn new(boat: &str) -> Result<Self> {
-        let mut model = resolve(boat, std::path::Path::new(""))?;
-        // Rays do not look at textures.
-        model.texture = None;
-        let painter = Painter::new(SIZE, std::slice::from_ref(&model), &[], (1, Some(SOFTWARE)))?;
-        Ok(Self { model, painter: RefCell::new(painter), black: picture(&RgbImage::new(SIZE.0, SIZE.1))? })
+        Ok(Self(DrawnBoat::new(boat)?))
     }
 
     /// The scene of a case as the product gets it.
     pub fn scene(&self, case: &Sunlit) -> Result<Scene> {
-        let lens = Lens::pinhole(SIZE.0, SIZE.1, HFOV_DEG.to_radians());
-        let camera = scenes::camera(EYE_M, case.range_m());
-        let calm = BeaufortForce::new(1).context("no such force")?;
-        let tones = SeaTones::default();
-        let mut scene = scenes::scene(
-            (camera, lens),
-            tones,
-            &self.model,
-            &[case.afloat()],
-            (ReflectionMethod::Off, calm),
-        );
         let sky = Vec3::new(0.16, 0.2, 0.26);
-        scene.light = Light {
+        let light = Light {
             sun_direction: case.sun,
             sun: Vec3::new(0.85, 0.8, 0.72),
             sky,
@@ -169,16 +122,12 @@ impl Studio {
             horizon: sky,
             sea: 0.2 * sky,
         };
-        for pass in [Pass::Mirror, Pass::Water, Pass::Hud] {
-            scene.passes[pass as usize] = PassDecision::LeftOut(LeftOut::ReflectionOff);
-        }
-        scene.passes[Pass::Shadow as usize] = PassDecision::Run;
-        Ok(scene)
+        self.0.scene(case.range_m(), case.afloat(), light)
     }
 
     /// Draws a scene.
     pub fn paint(&self, scene: &Scene) -> Result<RgbImage> {
-        self.painter.borrow_mut().paint(scene, &self.black)
+        self.0.paint(scene)
     }
 
     /// A boat of this model between the eye and that sun, abeam to the light, so that its hull shades the eye. It hangs in the air: no boat but a
@@ -200,8 +149,8 @@ impl Studio {
             scene.boats.first().and_then(|boat| boat.hull).context("the boat is out of the picture")?;
         let origin = case.afloat().pose().position;
         let afloats = std::iter::once(case.afloat()).chain(case.others()).chain(more.iter().copied());
-        let meshes = afloats.map(|afloat| CasterMesh::of(&self.model, afloat.pose(), origin)).collect();
-        let mesh = boat::mesh(&self.model, case.afloat().pose());
+        let meshes = afloats.map(|afloat| CasterMesh::of(&self.0.model, afloat.pose(), origin)).collect();
+        let mesh = boat::mesh(&self.0.model, case.afloat().pose());
         let (camera, lens) = (&scene.camera, &scene.lens);
         let rays = EyeRays { camera, lens, mesh: &mesh, origin };
         let (seen, truth) = rays.look(hull, case.sun);
@@ -237,13 +186,6 @@ impl Studio {
     }
 }
 
-/// The scene without the shadow's pass.
-pub fn without_shadow(scene: &Scene) -> Scene {
-    let mut scene = scene.clone();
-    scene.passes[Pass::Shadow as usize] = PassDecision::LeftOut(LeftOut::NoSun);
-    scene
-}
-
 /// The eye as the methods get it.
 pub fn eye(camera: &CameraPose, lens: &Lens, origin: DVec3) -> ShadowEye {
     ShadowEye {
@@ -264,13 +206,12 @@ fn composed(
     share: impl Fn(usize) -> f64,
 ) -> RgbImage {
     let mut made = lit.clone();
-    let linear = |code: u8| srgb_to_linear(f32::from(code) / 255.0);
     for (i, _) in on.iter().enumerate().filter(|(_, on)| on.is_some()) {
         let (x, y) = cutout.place(i);
         let (lit, dark, share) = (lit.get_pixel(x, y), dark.get_pixel(x, y), share(i) as f32);
         let mixed = [0, 1, 2].map(|c| {
-            let (lit, dark) = (linear(lit[c]), linear(dark[c]));
-            (linear_to_srgb(dark + (lit - dark) * share) * 255.0).round() as u8
+            let (lit, dark) = (files::linear(lit[c]), files::linear(dark[c]));
+            files::code(dark + (lit - dark) * share)
         });
         made.put_pixel(x, y, Rgb(mixed));
     }

@@ -7,7 +7,10 @@ use glam::{DVec2, DVec3};
 use hw_sim::ocean::mesh::BoatMesh;
 use rayon::prelude::*;
 
-use super::studio::{eye, on_disc, sun};
+use super::{
+    super::drawn_boat::towards,
+    studio::{eye, on_disc},
+};
 use crate::{
     bench::{PartBench, Way, thread_ns},
     front::median,
@@ -68,7 +71,7 @@ impl Grounds {
             rays.push(boat::mesh(&model, pose));
         }
         let lens = Lens::pinhole(size.0, size.1, 50f64.to_radians());
-        Ok(Self { camera: scenes::camera(6.0, 30.0), lens, sun: sun(35.0, 70.0), meshes, rays })
+        Ok(Self { camera: scenes::camera(6.0, 30.0), lens, sun: towards(35.0, 70.0), meshes, rays })
     }
 
     /// The nearest hit of a ray: its distance, normal and which object it is; the ground's where there is none.
