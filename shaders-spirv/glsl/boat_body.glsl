@@ -11,6 +11,8 @@ layout(location = 3) in vec3 albedo;
 layout(location = 4) in vec4 sky0;
 layout(location = 5) in vec4 sky1;
 layout(location = 6) in vec2 sky2;
+// The sun's light by way of the boat's other faces, by where the sun stands.
+layout(location = 7) in vec4 thrown;
 
 // Whether there may be a searchlight, flares, fires.
 layout(constant_id = 2) const bool LAMPLIGHT = false;
@@ -40,7 +42,8 @@ vec3 lit_around(BoatBlock boat) {
     vec3 sky = boat.lobes[0].rgb * sky0.x + boat.lobes[1].rgb * sky0.y + boat.lobes[2].rgb * sky0.z
         + boat.lobes[3].rgb * sky0.w + boat.lobes[4].rgb * sky1.x + boat.lobes[5].rgb * sky1.y
         + boat.lobes[6].rgb * sky1.z + boat.lobes[7].rgb * sky1.w + boat.lobes[8].rgb * sky2.x;
-    return albedo * (max(sky, 0.0) + frame.sea.rgb * sky2.y);
+    float by_faces = max(thrown.x + dot(thrown.yzw, boat.sun.xyz), 0.0);
+    return albedo * (max(sky, 0.0) + frame.sea.rgb * sky2.y + frame.sun.rgb * by_faces);
 }
 
 // Light of the gun's searchlight, which stands so close to the eye that little is seen that it does not light.

@@ -539,5 +539,8 @@ block! {
         pub sky1: [f32; 4],
         /// ...8, and over that of the sea.
         pub sky2: [f32; 2],
+        /// The sun's light by way of the boat's other faces, over the radiance of white that faces the sun: the product with 1 and the unit
+        /// vector towards the sun.
+        pub thrown: [f32; 4],
     }
 }

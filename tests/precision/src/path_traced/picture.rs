@@ -13,7 +13,7 @@ use super::{
     tracer::{Gathered, Tracer},
 };
 
-/// Where light came from.
+/// Where light came from, at once or by way of the hull.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Component {
     /// The disc of sun or moon.
@@ -22,8 +22,8 @@ pub enum Component {
     Sky,
     /// The sea.
     Sea,
-    /// Any of these by way of the hull, and the hull's own image in the sea.
-    Hull,
+    /// The hull's own image in the sea.
+    HullInSea,
 }
 
 /// The eye and what it looks at.

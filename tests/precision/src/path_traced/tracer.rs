@@ -9,7 +9,7 @@ use hw_sim::ocean::{
     random::LightPath,
 };
 
-use super::light::TracedLight;
+use super::{light::TracedLight, picture::Component};
 
 /// Hulls that a path meets at most.
 const BOUNCES: u32 = 5;
@@ -18,10 +18,10 @@ const DISC: f64 = 0.5 * 0.53 * std::f64::consts::PI / 180.0;
 /// Rays start so far off a surface, metres.
 const OFF_M: f64 = 0.002;
 
-/// Light that a place sends to the eye, by where it came from: the disc, the sky and the sea at once, and anything by way of the hull.
+/// Light that a place sends to the eye, at once or by way of the hull, by where it came from.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Gathered {
-    /// In the order of [`super::Component`].
+    /// In the order of [`Component`].
     pub parts: [Vec3; 4],
 }
 
@@ -61,20 +61,20 @@ impl Tracer<'_> {
         let mut gathered = Gathered::default();
         let mut place = Place::of(hit, from, along);
         let mut carried = Vec3::ONE;
-        for bounce in 0..BOUNCES {
+        for _ in 0..BOUNCES {
             carried *= place.albedo;
             let out = around(place.normal, path.unit(), path.unit());
             let direct = carried * self.sunlight(&place, path);
-            gathered.parts[if bounce == 0 { 0 } else { 3 }] += direct;
+            gathered.parts[Component::Sun as usize] += direct;
             let hull = match self.meet(place.at, out) {
                 Met::Hull(hull) => hull,
                 Met::Sky => {
-                    gathered.parts[if bounce == 0 { 1 } else { 3 }] += carried * self.light.sky(out);
+                    gathered.parts[Component::Sky as usize] += carried * self.light.sky(out);
                     break;
                 }
                 Met::Sea(at) => {
-                    gathered.parts[if bounce == 0 { 2 } else { 3 }] += carried * self.light.sea;
-                    gathered.parts[3] += carried * self.hull_in_sea(at, out, path);
+                    gathered.parts[Component::Sea as usize] += carried * self.light.sea;
+                    gathered.parts[Component::HullInSea as usize] += carried * self.hull_in_sea(at, out, path);
                     break;
                 }
             };

@@ -65,6 +65,7 @@ impl BoatPipelines {
             (vk::Format::R32G32B32A32_SFLOAT, 44),
             (vk::Format::R32G32B32A32_SFLOAT, 60),
             (vk::Format::R32G32_SFLOAT, 76),
+            (vk::Format::R32G32B32A32_SFLOAT, 84),
         ];
         // A layer of codes holds roots, one of light is filtered as it is.
         let constants = [u32::from(colour == UNORM), samples.as_raw()];

@@ -5,14 +5,13 @@
 use std::{collections::HashMap, ops::Range};
 
 use bowwave_core::model::{Model, ModelKind, Vertex};
-use glam::Vec3;
 use meshopt::{SimplifyOptions, VertexDataAdapter, simplify_with_attributes_and_locks};
 use shaders_spirv::interface::MeshVertex;
 
 use crate::{
     passes::boats::parts::Parts,
     passes::boats::split::{EDGE_PX, split},
-    passes::boats::transfer::{Transfer, transfers},
+    passes::boats::transfer::{CornerLight, baked_light},
     view::DETAIL_PX,
 };
 
@@ -22,7 +21,12 @@ const ERROR_MIN_M: f32 = 0.008;
 const TRIANGLES_MIN: usize = 40;
 /// What a whole change of normal and of colour weighs, in parts of the level's error.
 const NORMAL_WEIGHT: f32 = 0.5;
+const FAR_NORMAL_WEIGHT: f32 = 1.5;
 const ALBEDO_WEIGHT: f32 = 6.0;
+
+/// Up to this error, metres, triangles on either side of an edge between two colours or of a sharp edge stay apart: stripes and gunwales are pixels wide
+/// there, and boats that near are few. Farther off a boat has half as many triangles without.
+const SEAMS_M: f32 = 0.1;
 
 /// A model at one level of detail, as ranges of indices.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -67,16 +71,13 @@ fn least_pixel_m(error_m: f32, size_m: f32) -> f32 {
 pub(crate) fn simplify(model: &Model, bent: bool) -> Simplified {
     /// A level is kept if it has at most this share of the triangles of the one before.
     const WORTHWHILE: f64 = 0.8;
-    let seen = transfers(model);
-    let corner = |(v, seen): (&Vertex, &[Transfer; 2])| lit_corner(v, v.normal, &seen[0]);
-    let vertices: Vec<MeshVertex> = model.vertices.iter().zip(seen.iter()).map(corner).collect();
+    let light = baked_light(model);
     let triangles: Vec<[u32; 3]> = model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     let parts = Parts::of(model);
     let closed: Vec<bool> = triangles.iter().map(|t| parts.closed(t[0])).collect();
     let size_m = (model.max - model.min).max_element();
-    let mut all = Simplified { vertices, bent, size_m, ..Simplified::default() };
-    let mut sides = Sides { model, seen: &seen, others: HashMap::new() };
-    all.push(0.0, &triangles, &closed, &mut sides);
+    let mut all = Simplified { bent, size_m, ..Simplified::default() };
+    all.push(0.0, &triangles, &closed, Corners::new(model, &light.corners));
     // A texture's seams would tear, and a picture has few triangles anyway.
     if model.texture.is_some() || model.kind == ModelKind::Quad {
         return all;
@@ -89,50 +90,64 @@ pub(crate) fn simplify(model: &Model, bent: bool) -> Simplified {
         if !fewer.is_empty() && fewer.len() as f64 <= WORTHWHILE * last as f64 {
             last = fewer.len();
             let closed: Vec<bool> = fewer.iter().map(|t| parts.closed(t[0])).collect();
-            all.push(error, &fewer, &closed, &mut sides);
+            let corners = light.on_level(model, &fewer, error);
+            all.push(error, &fewer, &closed, Corners::new(model, &corners));
         }
         error *= 2.0;
     }
     all
 }
 
-/// A corner with what it sees on the side of `normal`.
-fn lit_corner(v: &Vertex, normal: Vec3, seen: &Transfer) -> MeshVertex {
-    let [a, b, c, d, e, f, g, h, i, sea] = *seen;
-    MeshVertex {
-        position: v.position.to_array(),
-        normal: normal.to_array(),
-        uv: v.uv.to_array(),
-        albedo: v.albedo.to_array(),
-        sky0: [a, b, c, d],
-        sky1: [e, f, g, h],
-        sky2: [i, sea],
-    }
-}
-
-/// The corners of open shells, which are seen and lit from both sides: each side has its own.
-struct Sides<'a> {
+/// The corners of one level: those of open shells are seen and lit from both sides, and each side has its own.
+struct Corners<'a> {
     model: &'a Model,
-    seen: &'a [[Transfer; 2]],
-    /// The corner of the other side.
-    others: HashMap<u32, u32>,
+    light: &'a [CornerLight],
+    /// The drawn corner of a corner's side: 0 on that of its normal, 1 on the other.
+    drawn: HashMap<(u32, usize), u32>,
 }
 
-impl Sides<'_> {
+impl<'a> Corners<'a> {
+    fn new(model: &'a Model, light: &'a [CornerLight]) -> Self {
+        Self { model, light, drawn: HashMap::new() }
+    }
+
+    fn drawn(&mut self, vertices: &mut Vec<MeshVertex>, corner: u32, side: usize) -> u32 {
+        let (model, light) = (self.model, self.light);
+        *self.drawn.entry((corner, side)).or_insert_with(|| {
+            let (v, light) = (&model.vertices[corner as usize], &light[corner as usize]);
+            vertices.push(lit_corner(v, light, side));
+            vertices.len() as u32 - 1
+        })
+    }
+
+    /// A triangle of the corners on the sides of their normals.
+    fn front(&mut self, vertices: &mut Vec<MeshVertex>, triangle: [u32; 3]) -> [u32; 3] {
+        triangle.map(|i| self.drawn(vertices, i, 0))
+    }
+
     /// A triangle of the corners whose normals are on the side from which it is seen this way round.
     fn facing(&mut self, vertices: &mut Vec<MeshVertex>, triangle: [u32; 3]) -> [u32; 3] {
         let [a, b, c] = triangle.map(|i| self.model.vertices[i as usize].position);
         let face = (b - a).cross(c - a);
         triangle.map(|i| {
-            let v = &self.model.vertices[i as usize];
-            if face.dot(v.normal) >= 0.0 {
-                return i;
-            }
-            *self.others.entry(i).or_insert_with(|| {
-                vertices.push(lit_corner(v, -v.normal, &self.seen[i as usize][1]));
-                vertices.len() as u32 - 1
-            })
+            let side = usize::from(face.dot(self.model.vertices[i as usize].normal) < 0.0);
+            self.drawn(vertices, i, side)
         })
+    }
+}
+
+/// A corner as it is drawn on one of its sides.
+fn lit_corner(v: &Vertex, light: &CornerLight, side: usize) -> MeshVertex {
+    let [a, b, c, d, e, f, g, h, i, sea, thrown @ ..] = light.seen[side];
+    MeshVertex {
+        position: v.position.to_array(),
+        normal: (if side == 0 { v.normal } else { -v.normal }).to_array(),
+        uv: v.uv.to_array(),
+        albedo: light.albedo.to_array(),
+        sky0: [a, b, c, d],
+        sky1: [e, f, g, h],
+        sky2: [i, sea],
+        thrown,
     }
 }
 
@@ -149,8 +164,11 @@ fn with_error(model: &Model, parts: &Parts, error: f32) -> Vec<[u32; 3]> {
         .flat_map(|v| v.normal.to_array().into_iter().chain(v.albedo.to_array()))
         .collect();
     let locks: Vec<bool> = (0..model.vertices.len() as u32).map(|v| parts.is_panel(v, error)).collect();
-    let (normal, albedo) = (NORMAL_WEIGHT * error, ALBEDO_WEIGHT * error);
+    let far = error > SEAMS_M;
+    let normal = if far { FAR_NORMAL_WEIGHT } else { NORMAL_WEIGHT } * error;
+    let albedo = ALBEDO_WEIGHT * error;
     let weights = [normal, normal, normal, albedo, albedo, albedo];
+    let seams = if far { SimplifyOptions::Permissive } else { SimplifyOptions::None };
     let fewer = simplify_with_attributes_and_locks(
         &model.indices,
         &adapter,
@@ -160,20 +178,25 @@ fn with_error(model: &Model, parts: &Parts, error: f32) -> Vec<[u32; 3]> {
         &locks,
         TRIANGLES_MIN * 3,
         error,
-        SimplifyOptions::ErrorAbsolute | SimplifyOptions::Prune | SimplifyOptions::Permissive,
+        SimplifyOptions::ErrorAbsolute | SimplifyOptions::Prune | seams,
         None,
     );
     fewer.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
 }
 
 impl Simplified {
-    fn push(&mut self, error_m: f32, triangles: &[[u32; 3]], closed: &[bool], sides: &mut Sides<'_>) {
-        let mut triangles: Vec<_> = triangles.iter().copied().zip(closed.iter().copied()).collect();
-        let open: Vec<[u32; 3]> = triangles.extract_if(.., |(_, closed)| !*closed).map(|(t, _)| t).collect();
-        for [a, b, c] in open {
-            triangles.push((sides.facing(&mut self.vertices, [a, b, c]), false));
-            triangles.push((sides.facing(&mut self.vertices, [a, c, b]), false));
+    fn push(&mut self, error_m: f32, triangles: &[[u32; 3]], closed: &[bool], mut corners: Corners<'_>) {
+        let mut drawn = Vec::with_capacity(2 * triangles.len());
+        for (t, closed) in triangles.iter().zip(closed) {
+            let [a, b, c] = *t;
+            if *closed {
+                drawn.push((corners.front(&mut self.vertices, *t), true));
+            } else {
+                drawn.push((corners.facing(&mut self.vertices, [a, b, c]), false));
+                drawn.push((corners.facing(&mut self.vertices, [a, c, b]), false));
+            }
         }
+        let mut triangles = drawn;
         if self.bent {
             triangles = split(&mut self.vertices, triangles, EDGE_PX * least_pixel_m(error_m, self.size_m));
         }
@@ -190,6 +213,8 @@ impl Simplified {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
     use crate::testing;
 

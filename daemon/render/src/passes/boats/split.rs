@@ -61,6 +61,7 @@ fn cut(
         sky0: Vec4::from(a.sky0).midpoint(Vec4::from(b.sky0)).to_array(),
         sky1: Vec4::from(a.sky1).midpoint(Vec4::from(b.sky1)).to_array(),
         sky2: Vec2::from(a.sky2).midpoint(Vec2::from(b.sky2)).to_array(),
+        thrown: Vec4::from(a.thrown).midpoint(Vec4::from(b.thrown)).to_array(),
     };
     let index = u32::try_from(vertices.len()).ok()?;
     vertices.push(new);

@@ -1,5 +1,11 @@
-//! Shares of the sky and of the sea that each corner of a boat sees past the boat itself: found once when a model is taken, so that a frame's light
-//! of the whole sky is a sum of ten products a corner (precomputed radiance transfer, Sloan, Kautz and Snyder 2002, for matt surfaces).
+//! The light that each corner of a boat gets of the sky and of the sea past the boat itself, and by way of the boat: found once when a model is
+//! taken, so that a frame's light of the whole sky is a sum of ten products a corner, and what the sun sends from hull to hull four more
+//! (precomputed radiance transfer with interreflection, Sloan, Kautz and Snyder 2002, for matt surfaces).
+
+mod fit;
+mod level;
+mod picture;
+mod places;
 
 use std::{
     collections::HashMap,
@@ -9,31 +15,55 @@ use std::{
 
 use bowwave_core::{
     model::{Model, Vertex},
-    sky::{LOBES, SkyLobes},
+    sky::LOBES,
 };
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
+
+use fit::{Sample, fit};
+use places::{Place, lit_places};
 
 /// Directions above the water and below it from which light comes. They spiral: no two are above each other.
 const ABOVE: u32 = 120;
 const BELOW: u32 = 40;
-/// Texels along each side of the depth picture that is taken from each of them.
-const TEXELS: usize = 256;
 
-/// What a matt white corner makes of the light that there is: its radiance over that of each of the sky's lobes, then over that of the sea.
-pub(crate) type Transfer = [f32; LOBES + 1];
+/// Index of the sea in a [`Transfer`], and of what the sun sends from hull to hull.
+pub(crate) const SEA: usize = LOBES;
+pub(crate) const SUN: usize = LOBES + 1;
+/// Terms of the latter: 1 and the three coordinates of the unit vector towards the sun.
+const SUN_TERMS: usize = 4;
 
-/// Transfers of a model's corners: on the side of the normal, and on the other.
-pub(crate) type Transfers = Arc<Vec<[Transfer; 2]>>;
+/// What a matt white corner makes of the light that there is, from there and by way of the boat: its radiance over that of each of the sky's lobes,
+/// then over that of the sea. Then, over the radiance of white that faces the sun, of what the boat's other faces throw to it, as a sum of
+/// [`SUN_TERMS`]; the sun itself is not in it.
+pub(crate) type Transfer = [f32; SUN + SUN_TERMS];
 
-/// The transfers of `model`, whose indices are known to lie within its vertices. Models that were seen before are not looked at again.
-pub(crate) fn transfers(model: &Model) -> Transfers {
-    static KNOWN: OnceLock<Mutex<HashMap<u64, Transfers>>> = OnceLock::new();
+/// No light.
+const DARK: Transfer = [0.0; SUN + SUN_TERMS];
+
+/// What a corner is drawn with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CornerLight {
+    /// On the side of the normal, and on the other.
+    pub(crate) seen: [Transfer; 2],
+    /// Linear diffuse reflectance.
+    pub(crate) albedo: Vec3,
+}
+
+/// The light of a model: at its corners, and at places all over its surface.
+pub(crate) struct BakedLight {
+    pub(crate) corners: Vec<CornerLight>,
+    places: Vec<Place>,
+}
+
+/// The light of `model`, whose indices are known to lie within its vertices. Models that were seen before are not looked at again.
+pub(crate) fn baked_light(model: &Model) -> Arc<BakedLight> {
+    static KNOWN: OnceLock<Mutex<HashMap<u64, Arc<BakedLight>>>> = OnceLock::new();
     let key = shape_hash(model);
     let known = || KNOWN.get_or_init(Mutex::default).lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(found) = known().get(&key) {
         return Arc::clone(found);
     }
-    let found = Arc::new(found_by_pictures(model));
+    let found = Arc::new(BakedLight::of(model));
     known().insert(key, Arc::clone(&found));
     found
 }
@@ -41,13 +71,11 @@ pub(crate) fn transfers(model: &Model) -> Transfers {
 fn shape_hash(model: &Model) -> u64 {
     let mut hasher = DefaultHasher::new();
     for v in &model.vertices {
-        v.position
-            .to_array()
-            .into_iter()
-            .chain(v.normal.to_array())
-            .for_each(|x| x.to_bits().hash(&mut hasher));
+        let of = [v.position, v.normal, v.albedo];
+        of.iter().flat_map(|of| of.to_array()).for_each(|x| x.to_bits().hash(&mut hasher));
     }
     model.indices.hash(&mut hasher);
+    model.texture.as_ref().map(|t| &t.rgba).hash(&mut hasher);
     hasher.finish()
 }
 
@@ -63,130 +91,37 @@ fn directions(count: u32, sign: f64) -> impl Iterator<Item = DVec3> {
     })
 }
 
-/// A place on the surface: what it sees is seen about its triangle's corners by their shares.
-struct Place {
-    corners: [usize; 3],
-    shares: [f32; 3],
-    position: Vec3,
-    normal: Vec3,
-    /// On the side of the normal and on the other: what it sees, and what it would see alone.
-    seen: [Transfer; 2],
-    alone: [f32; 2],
+impl BakedLight {
+    fn of(model: &Model) -> Self {
+        let places = lit_places(model);
+        let [front, back] = [0, 1].map(|side| {
+            let mut held = vec![DARK; model.vertices.len()];
+            let seen = places.iter().filter(|place| !place.buried[side]);
+            let samples: Vec<_> =
+                seen.map(|place| Sample { at: place.at, weight: 1.0, value: place.light[side] }).collect();
+            let weights = fit(&samples, &mut held);
+            held.iter_mut().for_each(bound);
+            fill_buried(model, weights.into_iter().map(|weight| weight > 0.0).collect(), &mut held);
+            held
+        });
+        let sides = front.into_iter().zip(back);
+        let corner = |(v, (front, back)): (&Vertex, _)| CornerLight { seen: [front, back], albedo: v.albedo };
+        Self { corners: model.vertices.iter().zip(sides).map(corner).collect(), places }
+    }
 }
 
-/// Places all over the surface: more on large triangles, one on each at least.
-fn places(model: &Model) -> Vec<Place> {
-    /// About so many on the whole, and at most so many on a triangle.
-    const ALL: f32 = 5000.0;
-    const MOST: f32 = 16.0;
-    let at = |i: u32| model.vertices.get(i as usize);
-    let area =
-        |t: [&Vertex; 3]| (t[1].position - t[0].position).cross(t[2].position - t[0].position).length();
-    let triangles = || {
-        let corners = model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]);
-        corners.filter_map(|t| Some((t, [at(t[0])?, at(t[1])?, at(t[2])?])))
-    };
-    let whole: f32 = triangles().map(|(_, t)| area(t)).sum();
-    let mut found = Vec::new();
-    for (indices, corners) in triangles() {
-        let count = (area(corners) / whole * ALL).clamp(1.0, MOST) as u32;
-        for i in 0..count {
-            // Roberts' sequence: evenly spread for any count.
-            let fraction = |step: f32| (0.5 + step * i as f32).fract();
-            let (u, v) = (fraction(0.754_877_7).sqrt(), fraction(0.569_840_3));
-            let shares = [1.0 - u, u * (1.0 - v), u * v];
-            let mix = |of: fn(&Vertex) -> Vec3| (0..3).map(|k| of(corners[k]) * shares[k]).sum::<Vec3>();
-            found.push(Place {
-                corners: indices.map(|i| i as usize),
-                shares,
-                position: mix(|v| v.position),
-                normal: mix(|v| v.normal).normalize_or(corners[0].normal),
-                seen: [[0.0; LOBES + 1]; 2],
-                alone: [0.0; 2],
-            });
-        }
-    }
-    found
-}
-
-fn found_by_pictures(model: &Model) -> Vec<[Transfer; 2]> {
-    let mut places = places(model);
-    let mut picture = DepthPicture::of(model);
-    for (above, count) in [(true, ABOVE), (false, BELOW)] {
-        // A white surface's radiance is its irradiance over pi; each direction is a share of two pi.
-        let share = 2.0 / f64::from(count);
-        for direction in directions(count, if above { 1.0 } else { -1.0 }) {
-            picture.take(model, direction.as_vec3());
-            let lobes = SkyLobes::basis(direction).map(|value| (value * share) as f32);
-            for place in &mut places {
-                let cosine = place.normal.dot(direction.as_vec3());
-                let side = usize::from(cosine < 0.0);
-                let normal = if side == 0 { place.normal } else { -place.normal };
-                let cosine = cosine.abs();
-                place.alone[side] += cosine * share as f32;
-                if !picture.sees(place.position, normal) {
-                    continue;
-                }
-                let seen = &mut place.seen[side];
-                if above {
-                    seen.iter_mut().zip(lobes).for_each(|(of, value)| *of += value * cosine);
-                } else {
-                    seen[LOBES] += share as f32 * cosine;
-                }
-            }
-        }
-    }
-    let mut found = vec![[[0.0; LOBES + 1]; 2]; model.vertices.len()];
-    for side in 0..2 {
-        let known = at_corners(&places, side, &mut found);
-        fill_buried(model, side, known, &mut found);
-    }
-    found
-}
-
-/// What corners have to hold so that what is mixed of them over a triangle is what its places see: least squares, by the simultaneous
-/// iterative reconstruction of Gilbert 1972. Whether each corner is known: those of triangles whose every place lies within another part of the
-/// boat are not.
-fn at_corners(places: &[Place], side: usize, found: &mut [[Transfer; 2]]) -> Vec<bool> {
-    /// Share of what it would see alone at which a place counts as within another part.
-    const BURIED: f32 = 0.02;
-    const ROUNDS: u32 = 8;
-    let outside = |p: &&Place| p.seen[side][0] + p.seen[side][LOBES] > BURIED * p.alone[side];
-    let places: Vec<&Place> = places.iter().filter(outside).collect();
-    let mut weights = vec![0.0_f32; found.len()];
-    for place in &places {
-        place.corners.iter().zip(place.shares).for_each(|(at, share)| weights[*at] += share);
-    }
-    let mut more = vec![[0.0_f32; LOBES + 1]; found.len()];
-    for _ in 0..ROUNDS {
-        more.fill([0.0; LOBES + 1]);
-        for place in &places {
-            let mut off = place.seen[side];
-            for (at, share) in place.corners.iter().zip(place.shares) {
-                off.iter_mut().zip(found[*at][side]).for_each(|(off, held)| *off -= share * held);
-            }
-            for (at, share) in place.corners.iter().zip(place.shares) {
-                more[*at].iter_mut().zip(off).for_each(|(more, off)| *more += share * off);
-            }
-        }
-        for ((held, more), weight) in found.iter_mut().zip(&more).zip(&weights) {
-            held[side].iter_mut().zip(more).for_each(|(held, more)| *held += more / weight.max(0.05));
-        }
-    }
-    // No face gets less than no light, and none much more than all.
+/// No face gets less than no light, and none much more than all.
+fn bound(held: &mut Transfer) {
     const ALL: f32 = 1.05;
-    for held in found.iter_mut().map(|held| &mut held[side]) {
-        held[0] = held[0].max(0.0);
-        held[LOBES] = held[LOBES].max(0.0);
-        let times = ALL / (held[0] + held[LOBES]).max(ALL);
-        held.iter_mut().for_each(|held| *held *= times);
-    }
-    weights.into_iter().map(|weight| weight > 0.0).collect()
+    held[0] = held[0].max(0.0);
+    held[SEA] = held[SEA].max(0.0);
+    let times = ALL / (held[0] + held[SEA]).max(ALL);
+    held.iter_mut().for_each(|held| *held *= times);
 }
 
 /// Corners that lie within another part of the boat see nothing, and would darken what is seen of their triangles: they get the mean of
 /// their neighbours that do.
-fn fill_buried(model: &Model, side: usize, mut known: Vec<bool>, found: &mut [[Transfer; 2]]) {
+fn fill_buried(model: &Model, mut known: Vec<bool>, found: &mut [Transfer]) {
     /// Rounds: corners of two buried rings.
     const ROUNDS: u32 = 3;
     for _ in 0..ROUNDS {
@@ -195,118 +130,36 @@ fn fill_buried(model: &Model, side: usize, mut known: Vec<bool>, found: &mut [[T
             let corners = [t[0] as usize, t[1] as usize, t[2] as usize];
             for at in corners.into_iter().filter(|at| !known[*at]) {
                 for other in corners.into_iter().filter(|other| known[*other]) {
-                    let (sum, count) = sums.entry(at).or_insert(([0.0; LOBES + 1], 0.0));
-                    sum.iter_mut().zip(found[other][side]).for_each(|(sum, value)| *sum += value);
+                    let (sum, count) = sums.entry(at).or_insert((DARK, 0.0));
+                    sum.iter_mut().zip(found[other]).for_each(|(sum, value)| *sum += value);
                     *count += 1.0;
                 }
             }
         }
         for (at, (sum, count)) in sums {
-            found[at][side] = sum.map(|value| value / count);
+            found[at] = sum.map(|value| value / count);
             known[at] = true;
         }
     }
 }
 
-/// The boat seen from far away: how near its surface is at each place.
-struct DepthPicture {
-    middle: Vec3,
-    radius: f32,
-    across: Vec3,
-    up: Vec3,
-    towards: Vec3,
-    /// Greatest way towards the light, metres.
-    nearest: Vec<f32>,
-}
-
-impl DepthPicture {
-    fn of(model: &Model) -> Self {
-        let middle = 0.5 * (model.min + model.max);
-        let radius = model.vertices.iter().map(|v| v.position.distance(middle)).fold(0.1, f32::max);
-        Self {
-            middle,
-            radius,
-            across: Vec3::X,
-            up: Vec3::Y,
-            towards: Vec3::Z,
-            nearest: vec![f32::NEG_INFINITY; TEXELS * TEXELS],
-        }
-    }
-
-    /// Metres of a texel.
-    fn texel_m(&self) -> f32 {
-        2.0 * self.radius / (TEXELS - 4) as f32
-    }
-
-    /// Texel coordinates and way towards the light.
-    fn place(&self, p: Vec3) -> Vec3 {
-        let (p, half) = (p - self.middle, 0.5 * TEXELS as f32);
-        let flat = Vec2::new(p.dot(self.across), p.dot(self.up)) / self.texel_m() + half;
-        flat.extend(p.dot(self.towards))
-    }
-
-    fn take(&mut self, model: &Model, towards: Vec3) {
-        (self.across, self.up) = towards.any_orthonormal_pair();
-        self.towards = towards;
-        self.nearest.fill(f32::NEG_INFINITY);
-        let placed: Vec<Vec3> = model.vertices.iter().map(|v| self.place(v.position)).collect();
-        for t in model.indices.chunks_exact(3) {
-            self.draw([t[0], t[1], t[2]].map(|i| placed[i as usize]));
-        }
-    }
-
-    fn draw(&mut self, [a, b, c]: [Vec3; 3]) {
-        let edge = |p: Vec3, q: Vec3| (q - p).truncate();
-        let area = edge(a, b).perp_dot(edge(a, c));
-        if area.abs() < 1e-6 {
-            return;
-        }
-        let last = (TEXELS - 1) as f32;
-        let low = a.min(b).min(c).clamp(Vec3::ZERO, Vec3::splat(last));
-        let high = a.max(b).max(c).clamp(Vec3::ZERO, Vec3::splat(last));
-        // Ways grow linearly over the triangle.
-        let (of_b, of_c) = (edge(a, c).perp() / -area, edge(a, b).perp() / area);
-        for y in low.y.floor() as usize..=high.y.floor() as usize {
-            for x in low.x.floor() as usize..=high.x.floor() as usize {
-                let p = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) - a.truncate();
-                let (u, v) = (p.dot(of_b), p.dot(of_c));
-                if u < 0.0 || v < 0.0 || u + v > 1.0 {
-                    continue;
-                }
-                let way = a.z + u * (b.z - a.z) + v * (c.z - a.z);
-                let nearest = &mut self.nearest[y * TEXELS + x];
-                *nearest = nearest.max(way);
-            }
-        }
-    }
-
-    /// Whether nothing is between a place on the surface, on the side of `normal`, and the light.
-    fn sees(&self, p: Vec3, normal: Vec3) -> bool {
-        /// Texels by which the place is lifted off its own surface, and by which something else must be nearer.
-        const OFF: f32 = 1.5;
-        const NEARER: f32 = 0.75;
-        let at = self.place(p + normal * (OFF * self.texel_m()));
-        let (x, y) = (at.x.max(0.0) as usize, at.y.max(0.0) as usize);
-        let nearest = self.nearest.get(y.min(TEXELS - 1) * TEXELS + x.min(TEXELS - 1));
-        nearest.is_none_or(|nearest| at.z + NEARER * self.texel_m() >= *nearest)
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use bowwave_core::sky::SkyLobes;
+
     use super::*;
     use crate::testing;
 
     /// Radiance of a white corner under a sky that is 1 everywhere over a black sea, and over a sea that is 1 under a black sky.
     fn parts(t: &Transfer) -> (f32, f32) {
-        (t[0], t[LOBES])
+        (t[0], t[SEA])
     }
 
     #[test]
     fn a_box_sees_what_its_sides_face() {
         let model = testing::box_model("box", [4.0, 2.0, 1.5], [0.5; 3]);
-        for (vertex, t) in model.vertices.iter().zip(transfers(&model).iter()) {
-            let (sky, sea) = parts(&t[0]);
+        for (vertex, t) in model.vertices.iter().zip(&baked_light(&model).corners) {
+            let (sky, sea) = parts(&t.seen[0]);
             let expected = match vertex.normal.z {
                 z if z > 0.9 => (1.0, 0.0),
                 z if z < -0.9 => (0.0, 1.0),
@@ -323,10 +176,11 @@ mod tests {
     #[test]
     fn boats_hide_parts_of_the_sky_from_themselves_and_never_add_to_it() {
         for name in ["skiff", "rhib", "dhow", "frigate"] {
-            let model = bowwave_models::resolve(name, std::path::Path::new(".")).unwrap();
-            let found = found_by_pictures(&model);
+            let mut model = bowwave_models::resolve(name, std::path::Path::new(".")).unwrap();
+            model.vertices.iter_mut().for_each(|v| v.albedo = Vec3::ZERO);
+            let found = BakedLight::of(&model).corners;
             let mut seen = 0.0;
-            for t in found.iter().flatten() {
+            for t in found.iter().flat_map(|corner| &corner.seen) {
                 let (sky, sea) = parts(t);
                 assert!(t.iter().all(|v| v.is_finite()) && sky >= 0.0 && sky + sea < 1.06, "{name}: {t:?}");
                 seen += sky + sea;
@@ -337,18 +191,22 @@ mod tests {
         }
     }
 
-    /// Whether a ray meets a triangle (Moeller and Trumbore 1997).
-    fn meets(from: DVec3, along: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
+    /// How far along a ray a triangle is (Moeller and Trumbore 1997), if it is met.
+    fn way(from: DVec3, along: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
         let (u, v) = (b - a, c - a);
         let p = along.cross(v);
         let det = u.dot(p);
         if det.abs() < 1e-12 {
-            return false;
+            return None;
         }
         let t = from - a;
         let q = t.cross(u);
         let (x, y, way) = (t.dot(p) / det, along.dot(q) / det, v.dot(q) / det);
-        x >= 0.0 && y >= 0.0 && x + y <= 1.0 && way > 0.004
+        (x >= 0.0 && y >= 0.0 && x + y <= 1.0 && way > 1e-9).then_some(way)
+    }
+
+    fn meets(from: DVec3, along: DVec3, triangle: [DVec3; 3]) -> bool {
+        way(from, along, triangle).is_some_and(|way| way > 0.004)
     }
 
     /// Light of a sky that brightens towards one side, and of the sea, on faces of four models: rays of other directions against what corners
@@ -359,11 +217,13 @@ mod tests {
         lobes.terms[1] = Vec3::splat(0.5);
         lobes.terms[3] = Vec3::splat(-0.6);
         lobes.terms[8] = Vec3::splat(0.15);
-        const SEA: f64 = 0.2;
+        const SEA_LIGHT: f64 = 0.2;
         let unit = |i: u64| (i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11) as f64 / (1_u64 << 53) as f64;
         for name in ["skiff", "rhib", "dhow", "frigate"] {
-            let model = bowwave_models::resolve(name, std::path::Path::new(".")).unwrap();
-            let seen = transfers(&model);
+            let mut model = bowwave_models::resolve(name, std::path::Path::new(".")).unwrap();
+            // Black, so that no light comes by way of the boat.
+            model.vertices.iter_mut().for_each(|v| v.albedo = Vec3::ZERO);
+            let seen = baked_light(&model);
             let at = |i: u32| &model.vertices[i as usize];
             let faces: Vec<[u32; 3]> = model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
             let triangles: Vec<[DVec3; 3]> =
@@ -397,7 +257,7 @@ mod tests {
                     if cosine <= 0.0 {
                         continue;
                     }
-                    let radiance = if z > 0.0 { f64::from(lobes.at(d).x) } else { SEA };
+                    let radiance = if z > 0.0 { f64::from(lobes.at(d).x) } else { SEA_LIGHT };
                     let light = radiance * cosine * 4.0 / f64::from(rays);
                     alone += light;
                     if !triangles.iter().any(|t| meets(from, d, *t)) {
@@ -405,9 +265,9 @@ mod tests {
                     }
                 }
                 let held = |k: usize| {
-                    let t = &seen[corners[k] as usize][0];
+                    let t = &seen.corners[corners[k] as usize].seen[0];
                     (0..LOBES).map(|i| f64::from(t[i] * lobes.terms[i].x)).sum::<f64>()
-                        + f64::from(t[LOBES]) * SEA
+                        + f64::from(t[SEA]) * SEA_LIGHT
                 };
                 // Places within another part of the boat are seen by nobody.
                 if truth > 0.0 {
@@ -424,5 +284,76 @@ mod tests {
             );
             assert!(percent(off) < 12.0 && off < 0.5 * off_alone && points > 60, "{name}: {off} of {light}");
         }
+    }
+
+    /// Light on the inside of an open box of which the sun and the sky reach a part, against paths of light.
+    #[test]
+    fn an_open_box_throws_light_to_itself_as_paths_do() {
+        const ALBEDO: f64 = 0.6;
+        let mut model = testing::box_model("box", [4.0, 2.0, 1.5], [ALBEDO as f32; 3]);
+        model.indices.truncate(30);
+        let corner = |i: &u32| model.vertices[*i as usize].position.as_dvec3();
+        let triangles: Vec<[DVec3; 3]> =
+            model.indices.chunks_exact(3).map(|t| [corner(&t[0]), corner(&t[1]), corner(&t[2])]).collect();
+        let nearest = |from: DVec3, along: DVec3| {
+            let hits = triangles.iter().filter_map(|t| Some((way(from, along, *t)?, *t)));
+            hits.min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        // Radiance of white that faces the sun is 1, and so is that of the sky.
+        let suns: Vec<DVec3> = [[0.9, 0.2], [0.5, -0.6], [-0.3, 0.1]]
+            .map(|[x, y]: [f64; 2]| DVec3::new(x, y, (1.0 - x * x - y * y).sqrt()))
+            .to_vec();
+        let mut state = 1_u64;
+        let mut even = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let places = lit_places(&model);
+        let (mut found, mut truth) = ([0.0; 4], [0.0; 4]);
+        const PATHS: u32 = 60;
+        for place in places.iter().filter(|p| !p.buried[1]).step_by(3) {
+            let light = place.light[1].map(f64::from);
+            found[0] += light[0];
+            for (found, sun) in found[1..].iter_mut().zip(&suns) {
+                let [one, x, y, z] = [0, 1, 2, 3].map(|i| light[SUN + i]);
+                *found += (one + sun.dot(DVec3::new(x, y, z))).max(0.0);
+            }
+            for _ in 0..PATHS {
+                let (mut at, mut normal, mut weight) =
+                    (place.position.as_dvec3(), -place.normal.as_dvec3(), 1.0 / f64::from(PATHS));
+                for bounce in 0..6 {
+                    if bounce > 0 {
+                        for (truth, sun) in truth[1..].iter_mut().zip(&suns) {
+                            if normal.dot(*sun) > 0.0 && nearest(at, *sun).is_none() {
+                                *truth += weight * normal.dot(*sun);
+                            }
+                        }
+                    }
+                    // Cosine-weighted (Malley).
+                    let (radius, (sin, cos)) = (even().sqrt(), (even() * std::f64::consts::TAU).sin_cos());
+                    let (u, v) = normal.any_orthonormal_pair();
+                    let along = u * radius * cos + v * radius * sin + normal * (1.0 - radius * radius).sqrt();
+                    let Some((far, t)) = nearest(at, along) else {
+                        truth[0] += if along.z > 0.0 { weight } else { 0.0 };
+                        break;
+                    };
+                    at += along * far;
+                    normal = (t[1] - t[0]).cross(t[2] - t[0]).normalize();
+                    normal *= -normal.dot(along).signum();
+                    at += normal * 1e-6;
+                    weight *= ALBEDO;
+                }
+            }
+        }
+        println!("found {found:?}, paths {truth:?}");
+        assert!((found[0] / truth[0] - 1.0).abs() < 0.04, "sky: {found:?} {truth:?}");
+        for k in 1..4 {
+            assert!((found[k] / truth[k] - 1.0).abs() < 0.25, "sun {k}: {found:?} {truth:?}");
+        }
+        // By a black box nothing comes.
+        model.vertices.iter_mut().for_each(|v| v.albedo = Vec3::ZERO);
+        let thrown =
+            |p: &Place| p.light.iter().flat_map(|l| l[SUN..].to_vec()).fold(0.0, |a: f32, b| a.max(b.abs()));
+        assert!(lit_places(&model).iter().map(thrown).fold(0.0, f32::max) < 1e-5);
     }
 }

@@ -111,7 +111,7 @@ impl HullErrors {
             product("with the true sun", sun),
             product("with the true light of the sky", sky),
             product("with the true light of the sea", sea),
-            product("with light from hull to hull", hull),
+            product("with the hull's own image in the sea", hull),
             product("with all of these", self.with_all),
             product("inner pixels alone", self.inner),
         ]);
@@ -220,7 +220,7 @@ impl HullStudio {
         })
     }
 
-    /// The product's light by where it comes from, each drawn alone over black; none goes from hull to hull.
+    /// The product's light by where it comes from, each drawn alone over black; the sea shows it no hull.
     fn parts(&self, cell: &Cell<'_>, cutout: &Cutout) -> Result<[Linear; 4]> {
         let light = cell.light.product();
         let none =
@@ -315,7 +315,7 @@ impl Stand {
 mod tests {
     use super::*;
 
-    /// On the whole a boat gets as much light of each kind from the renderer as from paths, but for what goes from hull to hull.
+    /// On the whole a boat gets as much light of each kind from the renderer as from paths, with what goes from hull to hull.
     #[test]
     fn a_boat_gets_as_much_light_as_paths_bring_it() {
         let light = Lit::clear("", 0.9, [40.0, 140.0]).traced().unwrap();
