@@ -199,9 +199,10 @@ impl Fleet {
         Self { searchlight, ..self }
     }
 
-    /// A flare is lit.
+    /// A flare is lit, by which crews see and are seen.
     pub fn light_flare(&mut self, flare: Flare) {
         self.flares.push(flare);
+        self.forget_crews_after(flare.lit.secs_since(self.start));
     }
 
     /// Flares that were lit, oldest first.
@@ -328,7 +329,7 @@ impl Fleet {
             warned: me.warned_s.is_some_and(|s| s <= time_s),
             hit: me.history.first_hit_s().is_some_and(|s| s <= time_s),
             neighbour_hit: self.struck.iter().any(near),
-            lit: !hidden && self.is_in_beam(boat, at, time_s),
+            lit: (!hidden && self.is_in_beam(boat, at, time_s)) || self.is_under_flare(boat, at, time_s),
             sees_gun: !hidden && self.sees_gun(boat, at, time_s),
         }
     }

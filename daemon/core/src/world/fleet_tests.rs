@@ -13,6 +13,7 @@ use crate::{
         boats::{
             Act, Course, CourseState, CrewPlan, CrewState, CrewedStart, Exit, Guard, LightsKept, Propulsor,
         },
+        flare::FlareSpec,
         score::boxed_model,
         searchlight::SearchlightSpec,
         waves::{Spectrum, WaveSpec},
@@ -219,6 +220,38 @@ fn a_crew_notices_a_beam_that_is_on_it_at_any_pace_of_frames() {
     assert_eq!((states, place), seen(10, 0.0), "at any pace of frames");
     assert_eq!(seen(30, 30.0).0[5], [Some("creep".to_owned()), Some("run".to_owned())]);
     assert_eq!(seen(30, 15.0).0[5], [Some("creep".to_owned()), Some("creep".to_owned())]);
+}
+
+#[test]
+fn a_crew_that_a_flare_lights_goes_on_at_any_pace_of_frames() {
+    let crew = plan(vec![
+        state(
+            "creep",
+            Act::Loiter { radius_m: 40.0 },
+            4.0,
+            vec![exit(Guard { lit: true, ..Guard::default() }, 1)],
+        ),
+        state("run", Act::Flee, 25.0, vec![]),
+    ]);
+    let run = |frames_a_second: u32| {
+        let night = SceneLight::new(&Daylight::fixed(DVec3::NEG_Z, 2e4), 5.0).at(start());
+        let mut fleet =
+            fleet(vec![crewed("a", &crew, 0.0, 300.0, Side::Hostile)], sea(2)).with_seeing(night, 8.0);
+        let mut is_lit = false;
+        let light = |fleet: &mut Fleet, time_s: f64| {
+            if !is_lit && time_s >= 2.0 {
+                is_lit = true;
+                let spec = FlareSpec::rocket(DVec2::new(0.0, 300.0));
+                fleet.light_flare(Flare { spec, lit: start().plus_secs(2.0), wind: DVec2::ZERO });
+            }
+        };
+        let states = |fleet: &Fleet, _| fleet.crew_state(0).map(str::to_owned);
+        let states = paced(&mut fleet, (6, frames_a_second), light, states);
+        (states, place(&fleet, 0, 6.0).position)
+    };
+    let (states, place) = run(30);
+    assert_eq!((states[1].as_deref(), states[5].as_deref()), (Some("creep"), Some("run")), "{states:?}");
+    assert_eq!((states, place), run(10));
 }
 
 #[test]

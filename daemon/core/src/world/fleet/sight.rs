@@ -18,6 +18,8 @@ use crate::{
 const SHIP_REFLECTANCE: f64 = 0.3;
 /// Width of the own ship as crews see her, metres: as much of her as lies about the gun.
 const SHIP_BREADTH_M: f64 = 24.0;
+/// Illuminance by the full moon, high in a clear sky, lux (Kyba, Mohar and Posch 2017, "How bright is moonlight?").
+const FULL_MOON_LUX: f64 = 0.25;
 /// Eyes of a crew are no lower than that over the water, metres.
 const EYES_LEAST_M: f64 = 1.2;
 
@@ -52,6 +54,17 @@ impl Fleet {
         self.flares.iter().filter_map(lux).sum()
     }
 
+    /// Tests whether flares light the crew of a boat at `at` so that it knows: by at least a full moon's light, and no less than sky, sun or moon give.
+    pub(super) fn is_under_flare(&self, boat: usize, at: DVec2, time_s: f64) -> bool {
+        if self.flares.is_empty() {
+            return false;
+        }
+        let ambient = |seeing: &Seeing| seeing.ambient.sky_lux + seeing.ambient.direct_lux;
+        let known_lux = FULL_MOON_LUX.max(self.seeing.at(time_s).map_or(0.0, ambient));
+        let crew = at.extend(0.5 * self.height_m(boat));
+        self.flares_lux(crew, self.start.plus_secs(time_s)) >= known_lux
+    }
+
     /// A boat as somebody at `eye` has it before the eye.
     fn target(&self, boat: usize, state: &CourseState, eye: DVec3, time: Time) -> Target {
         let time_s = time.secs_since(self.start);
@@ -80,7 +93,8 @@ impl Fleet {
         }
     }
 
-    /// Tests whether the crew of a boat at `at` sees the ship that the gun stands on, or its searchlight, which blinds those that it is on.
+    /// Tests whether the crew of a boat at `at` sees the ship that the gun stands on, by the light of the sky and of flares; or its searchlight, which
+    /// blinds those that it is on.
     pub(super) fn sees_gun(&self, boat: usize, at: DVec2, time_s: f64) -> bool {
         let helm_m = self.model(boat).map_or(0.0, |model| model.helm_middle().z);
         let eye = at.extend(helm_m.max(EYES_LEAST_M));
@@ -89,7 +103,7 @@ impl Fleet {
             breadth_m: SHIP_BREADTH_M,
             height_m: self.gun_m,
             reflectance: SHIP_REFLECTANCE,
-            lamp_lux: 0.0,
+            lamp_lux: self.flares_lux(DVec3::Z * self.gun_m, self.start.plus_secs(time_s)),
             candela: lamp.map_or(0.0, |lamp| lamp.candela_towards(eye, time_s)),
         };
         let glare = Glare { lux: lamp.map_or(0.0, |lamp| lamp.lux(eye, time_s)), off: 0.0 };

@@ -107,3 +107,28 @@ fn a_flare_shows_a_dark_boat_at_night_and_a_boat_on_fire_shows_itself() {
     assert!(dark.seen_from(GUN, start().plus_secs(40.0))[0] < 1.0, "it has burnt out");
     assert_eq!(seen(&fleet(-20.0, &[&at_800_m("burns_at_s = 0")]).1), [true]);
 }
+
+#[test]
+fn a_flare_lets_crews_know_that_they_are_seen_and_shows_them_the_ship() {
+    let rocket = |place: DVec2| Flare {
+        spec: FlareSpec::rocket(place),
+        lit: start().plus_secs(-5.0),
+        wind: DVec2::ZERO,
+    };
+    let under = |sun_deg: f64, place: DVec2| {
+        let (_, mut fleet) = fleet(sun_deg, &[&at_800_m("")]);
+        let at = fleet.boats[0].history.state(0.0).position;
+        assert!(!fleet.is_under_flare(0, at, 0.0), "none burns");
+        fleet.light_flare(rocket(place));
+        // Before it, while it burns, after it.
+        [-6.0, 0.0, 26.0].map(|time_s| fleet.is_under_flare(0, at, time_s))
+    };
+    assert_eq!(under(-20.0, DVec2::new(0.0, 700.0)), [false, true, false]);
+    assert_eq!(under(-20.0, DVec2::new(0.0, -400.0)), [false; 3], "too far off");
+    assert_eq!(under(10.0, DVec2::new(0.0, 700.0)), [false; 3], "by day nobody minds it");
+    let (_, mut dark) = fleet(-20.0, &[&at_800_m("")]);
+    let at = dark.boats[0].history.state(0.0).position;
+    assert!(!dark.sees_gun(0, at, 0.0));
+    dark.light_flare(rocket(DVec2::new(100.0, 0.0)));
+    assert!(dark.sees_gun(0, at, 0.0));
+}
