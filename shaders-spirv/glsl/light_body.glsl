@@ -1,6 +1,7 @@
 // A point of light as a lens shows it: a core as wide as the lens is sharp, and a glow (Moffat's profile with an exponent of 2) of what it
 // scatters. Light is added; it hides nothing.
 #include "light_block.glsl"
+#include "dither.glsl"
 
 #ifdef HIDDEN
 // Boats may stand before it: the depth of their layer, valid here.
@@ -19,5 +20,5 @@ void main() {
     float squared = dot(off, off);
     float fall = 1.0 + squared * light.glow.a;
     vec3 sum = light.core.rgb * exp(-squared * light.sharp) + light.glow.rgb / (fall * fall);
-    colour = vec4(sum, 0.0);
+    colour = vec4(dithered(sum), 0.0);
 }
