@@ -2,7 +2,7 @@
 //!
 //! A [`parts::NumericalPart`] holds the ways of doing one thing against a truth that shares no code with them: [`mod@bench`] times the ways
 //! of a scene in turns, [`front`] finds those that nothing beats, [`row`] writes the table and [`page`] the page. A study goes into one
-//! part in full and is a command of its own ([`alignment`], [`check`], [`horizon`], [`karma`], [`overload`], [`photograph`], [`reflection`], [`registration`],
+//! part in full and is a command of its own ([`alignment`], [`check`], [`documents`], [`horizon`], [`karma`], [`overload`], [`photograph`], [`reflection`], [`registration`],
 //! [`sea_video`], [`truth`]). The sea of the truths is `hw_sim::ocean`'s. [`table`] prints all tables.
 
 #![forbid(unsafe_code)]
@@ -12,6 +12,7 @@ pub mod alignment;
 pub mod bench;
 mod broad;
 pub mod check;
+pub mod documents;
 pub mod front;
 pub mod horizon;
 pub mod karma;

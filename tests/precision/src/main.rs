@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand};
 use precision::{
     alignment::CalibrationStudy,
     bench::{Effort, PartBench},
+    documents::{DocumentsStudy, Section, Workshop},
     front,
     horizon::report::HorizonStudy,
     karma::report::KarmaStudy,
@@ -48,12 +49,17 @@ struct ReportArgs {
     /// Folder for precision.csv and index.html
     #[arg(long, value_name = "DIR", default_value = "target/precision")]
     out: PathBuf,
+    /// The trainer's program, for rows of the source documents that are about a whole run
+    #[arg(long, default_value = "target/release/bowwave")]
+    program: PathBuf,
 }
 
 #[derive(Debug, Subcommand)]
 enum PrecisionStudy {
     /// Calibration of many simulated recordings: percentiles of the errors, and how often the stated uncertainty holds
     Calibration(CalibrationStudy),
+    /// Both source documents on light and shadow, row by row, with tables and pictures
+    Documents(DocumentsStudy),
     /// The horizon in real frames and drawn pictures: errors frame by frame, false ones, the time of a picture
     Horizon(HorizonStudy),
     /// A camera calibrated from its own film and gyro, and how far an overlay would drift
@@ -81,6 +87,7 @@ impl PrecisionStudy {
     fn run(&self) -> Result<()> {
         match self {
             Self::Calibration(study) => study.run(),
+            Self::Documents(study) => study.run(),
             Self::Horizon(study) => study.run(),
             Self::Karma(study) => study.run(),
             Self::Overload(study) => study.run(),
@@ -104,6 +111,15 @@ impl ReportArgs {
         Ok(PARTS.iter().filter(|p| names.is_empty() || names.iter().any(|n| *n == p.about.part)).collect())
     }
 
+    /// The source documents: all of them where all parts are measured, with pictures where there is time for them.
+    fn documents(&self) -> Result<Section> {
+        if !(self.part.is_empty() && self.only.is_empty()) {
+            return Ok(Section::default());
+        }
+        let workshop = Workshop { program: self.program.clone() };
+        Section::of_all((!self.quick).then_some(&workshop))
+    }
+
     fn run(&self) -> Result<()> {
         let parts = self.parts()?;
         let mut bench = PartBench::new(if self.quick { Effort::QUICK } else { Effort::FULL });
@@ -117,7 +133,7 @@ impl ReportArgs {
             .with_context(|| format!("cannot make the folder {}", self.out.display()))?;
         row::write_csv(&self.out.join("precision.csv"), &rows)?;
         let abouts: Vec<About> = parts.iter().map(|p| p.about).collect();
-        page::write(&self.out.join("index.html"), &abouts, &rows)?;
+        page::write(&self.out.join("index.html"), &abouts, &rows, &self.documents()?)?;
         println!("{} rows: {}", rows.len(), self.out.join("index.html").display());
         let complaints = front::complaints(&rows);
         if !complaints.is_empty() {

@@ -4,7 +4,7 @@ use std::{fmt::Write as _, path::Path};
 
 use anyhow::{Context, Result};
 
-use crate::{front, parts::About, plot, row::ReportRow};
+use crate::{documents::Section, front, parts::About, plot, row::ReportRow};
 
 const STYLE: &str = "body{font:16px/1.45 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}\
 h1{font-size:1.9rem}h2{margin-top:3rem;border-bottom:2px solid #ddd}h3{margin:1.8rem 0 .3rem}\
@@ -13,7 +13,9 @@ td,th{border-bottom:1px solid #ddd;padding:.2rem .7rem .2rem 0;text-align:left;v
 td.n,th.n{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}\
 tr.default{background:#fff0d8}dl{display:grid;grid-template-columns:5rem 1fr;gap:.3rem .8rem}\
 dt{font-weight:600}dd{margin:0}.box{overflow-x:auto}svg{max-width:100%;height:auto}\
-.bad{color:#b00020;font-weight:600}.small{font-size:.85rem;color:#555}";
+.bad{color:#b00020;font-weight:600}.small{font-size:.85rem;color:#555}h4{margin:2.2rem 0 .3rem;font-size:1.1rem}\
+.figures{display:flex;flex-wrap:wrap;gap:.8rem;align-items:flex-start}figure{margin:.4rem 0}\
+figure img{display:block;width:100%;height:auto}figcaption{font-size:.85rem;color:#555}code{font-size:.85rem;overflow-wrap:anywhere}";
 
 const INTRODUCTION: &str = "<h1>Error against run time</h1><p>Each numerical part of the trainer is measured against a truth \
 that shares no code with it, and against cheaper and dearer ways of doing the same. Rows on yellow, and ringed points, are what \
@@ -24,12 +26,12 @@ Errors are compared as they are, down to the truth's own; ∞ is what diverges o
 machine that made this page: compare them with each other only. Memory is what a way holds plus the most heap that one use \
 takes.</p>";
 
-fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// Three digits, with a raised exponent where there must be one.
-fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     if value.is_infinite() {
         return "∞".into();
     }
@@ -42,7 +44,7 @@ fn number(value: f64) -> String {
     format!("{mantissa}&thinsp;·&thinsp;10<sup>{exponent}</sup>")
 }
 
-fn time(ns: f64) -> String {
+pub(crate) fn time(ns: f64) -> String {
     let (value, unit) = match ns {
         n if n < 1e3 => (n, "ns"),
         n if n < 1e6 => (n / 1e3, "µs"),
@@ -154,7 +156,7 @@ fn summary(html: &mut String, rows: &[ReportRow]) -> Result<()> {
     Ok(())
 }
 
-fn section(html: &mut String, about: &About, rows: &[ReportRow]) -> Result<()> {
+fn part_section(html: &mut String, about: &About, rows: &[ReportRow]) -> Result<()> {
     writeln!(
         html,
         "<h2 id=\"{0}\">{0}</h2><p>{1}</p><dl><dt>Truth<dd>{2}<dt>Rivals<dd>{3}<dt>Default<dd>{4}</dl>",
@@ -185,12 +187,27 @@ fn section(html: &mut String, about: &About, rows: &[ReportRow]) -> Result<()> {
     Ok(())
 }
 
-/// The page, plots and style inside it, so that it opens from disk.
-pub fn html(abouts: &[About], rows: &[ReportRow]) -> Result<String> {
-    let mut html = format!(
+fn begin(title: &str) -> String {
+    format!(
         "<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content=\"width=device-width\">\
-         <title>Bowwave: error against run time</title><style>{STYLE}</style>{INTRODUCTION}\n"
-    );
+         <title>Bowwave: {title}</title><style>{STYLE}</style>"
+    )
+}
+
+/// The page of the source documents alone.
+pub fn documents_alone(section: &Section, rows: &[ReportRow]) -> Result<String> {
+    Ok(begin("source documents") + &section.contents() + &section.html(rows)? + "</html>\n")
+}
+
+/// The page, plots, pictures and style inside it, so that it opens from disk.
+pub fn html(abouts: &[About], rows: &[ReportRow], section: &Section) -> Result<String> {
+    let mut html = begin("error against run time") + INTRODUCTION + "\n";
+    let parts: Vec<String> =
+        abouts.iter().map(|about| format!("<a href=\"#{0}\">{0}</a>", about.part)).collect();
+    writeln!(html, "<p class=small>Parts: {}</p>", parts.join(" · "))?;
+    if !section.is_empty() {
+        writeln!(html, "<p><a href=\"#documents\">Source documents</a></p>{}", section.contents())?;
+    }
     let complaints = front::complaints(rows);
     if complaints.is_empty() {
         html.push_str("<p>No default is beaten but those that say so below.</p>\n");
@@ -201,15 +218,19 @@ pub fn html(abouts: &[About], rows: &[ReportRow]) -> Result<String> {
     }
     summary(&mut html, rows)?;
     for about in abouts {
-        section(&mut html, about, rows)?;
+        part_section(&mut html, about, rows)?;
+    }
+    if !section.is_empty() {
+        html.push_str(&section.html(rows)?);
     }
     html.push_str("</html>\n");
     Ok(html)
 }
 
 /// Writes [`html`] to a file.
-pub fn write(path: &Path, abouts: &[About], rows: &[ReportRow]) -> Result<()> {
-    std::fs::write(path, html(abouts, rows)?).with_context(|| format!("cannot write {}", path.display()))
+pub fn write(path: &Path, abouts: &[About], rows: &[ReportRow], section: &Section) -> Result<()> {
+    std::fs::write(path, html(abouts, rows, section)?)
+        .with_context(|| format!("cannot write {}", path.display()))
 }
 
 #[cfg(test)]
@@ -230,7 +251,7 @@ mod tests {
             rows.push(ranked);
             rows.push(ReportRow { part: about.part, scene: "odd & hard".into(), ..row("tried", 2.0) });
         }
-        let page = html(&abouts, &rows).unwrap();
+        let page = html(&abouts, &rows, &Section::default()).unwrap();
         for about in &abouts {
             assert!(page.contains(&format!("<h2 id=\"{}\">", about.part)), "{} is missing", about.part);
             assert!(page.contains(&escape(about.truth)) && page.contains(&escape(about.why)));
@@ -238,8 +259,14 @@ mod tests {
         assert_eq!(page.matches("<svg").count(), abouts.len());
         assert_eq!(page.matches("odd &amp; hard").count(), abouts.len());
         assert!(page.contains("a &lt; b") && !page.contains("a < b"));
+        assert!(!page.contains("id=\"documents\""));
+        let page = html(&abouts, &rows, &Section::of_all(None).unwrap()).unwrap();
+        let targets: Vec<&str> = page.split("href=\"#").skip(1).filter_map(|t| t.split('"').next()).collect();
+        assert!(targets.iter().filter(|t| t.starts_with("documents")).count() >= 19);
+        assert!(targets.iter().all(|t| page.contains(&format!("id=\"{t}\""))), "{targets:?}");
         // Opens from disk: nothing is fetched.
-        assert!(!page.contains("src=") && !page.contains("href=\"http"));
+        assert_eq!(page.matches("src=").count(), page.matches("src=\"data:image/").count());
+        assert!(!page.contains("href=\"http"));
     }
 
     #[test]

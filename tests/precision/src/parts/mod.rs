@@ -1,5 +1,6 @@
 //! The numerical parts.
 
+pub mod ambient;
 mod attitude;
 mod beam;
 mod board;
@@ -12,6 +13,7 @@ mod depth;
 mod drawn;
 mod drawn_boat;
 mod driving;
+mod fires;
 mod flight;
 mod fresnel;
 mod fusion;
@@ -31,9 +33,10 @@ mod own;
 mod pacing;
 mod phantom;
 mod reflection;
+pub mod relight;
 mod sea;
 mod seeing;
-mod shadow;
+pub mod shadow;
 mod shutter;
 mod skylight;
 mod skyline;
@@ -84,11 +87,14 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: sun::ABOUT, measure: sun::measure },
     NumericalPart { about: moon::ABOUT, measure: moon::measure },
     NumericalPart { about: skylight::ABOUT, measure: skylight::measure },
+    NumericalPart { about: ambient::ABOUT, measure: ambient::measure },
     NumericalPart { about: shadow::ABOUT, measure: shadow::measure },
     NumericalPart { about: hull::ABOUT, measure: hull::measure },
     NumericalPart { about: phantom::ABOUT, measure: phantom::measure },
     NumericalPart { about: beam::ABOUT, measure: beam::measure },
     NumericalPart { about: lamps::ABOUT, measure: lamps::measure },
+    NumericalPart { about: relight::ABOUT, measure: relight::measure },
+    NumericalPart { about: fires::ABOUT, measure: fires::measure },
     NumericalPart { about: seeing::ABOUT, measure: seeing::measure },
     NumericalPart { about: lens::ABOUT, measure: lens::measure },
     NumericalPart { about: drawn::ABOUT, measure: drawn::measure },

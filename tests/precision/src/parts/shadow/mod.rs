@@ -1,7 +1,7 @@
 //! The sun's shadows of a boat on itself.
 
 mod studio;
-mod table;
+pub mod table;
 
 use anyhow::Result;
 use glam::DVec3;

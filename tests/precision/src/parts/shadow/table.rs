@@ -17,7 +17,7 @@ use crate::{
     metric::flip_map,
     reflection::scenes::{self, Afloats},
     shadows::{
-        ShadowEye, ShadowFrame, TABLE_1,
+        METHODS, NamedMethod, ShadowEye, ShadowFrame, TABLE_1,
         mesh::CasterMesh,
         seen::{SeenPoint, SeenPoints},
     },
@@ -144,6 +144,21 @@ impl Grounds {
         }
         made
     }
+}
+
+/// Pictures of the objects: the truth, and what each method makes of it that a test by method and setting says yes to.
+pub fn pictures(size: (u32, u32), wants: impl Fn(&NamedMethod) -> bool) -> Result<Vec<(String, Vec<u8>)>> {
+    let grounds = Grounds::new(size)?;
+    let looked = grounds.look(16);
+    let truth = grounds.picture(&looked.seen, |point| looked.truth[point.number as usize]);
+    let mut made = vec![("rays to the sun's disc".to_owned(), truth)];
+    for named in METHODS.iter().filter(|named| !named.four_points && wants(named)) {
+        let mut method = (named.make)();
+        method.prepare(&grounds.frame(), &looked.seen);
+        let picture = grounds.picture(&looked.seen, |point| method.share(point));
+        made.push((format!("{}, {}", named.method, named.setting), picture));
+    }
+    Ok(made)
 }
 
 /// Measures the table.

@@ -1,0 +1,145 @@
+//! Rows of Kolivand and Sunar 2014.
+
+use super::{DocumentRow, PartTable, Source, at_sea, heavens, partitions, place};
+
+/// Rows in the document's order.
+pub const ROWS: &[DocumentRow] = &[
+    DocumentRow {
+        id: "sun",
+        source: Source::Kolivand,
+        name: "Sun from place, date and time",
+        passage: "Sky Modelling, eq. 1 to 4: solar time, declination, zenith and azimuth from the Julian day",
+        printed: "Solar time with sin(4 pi (J - 180) / 373) and sin(2 pi (J - 8) / 355), declination with sin(2 pi (J - 8) / 368), an arc tangent for the azimuth.",
+        breaks: "Its source has (J - 80) and (J - 81). An arc tangent does not know the quadrant; an arc sine of more than one is no number.",
+        product: "A maintained library of solar positions, NREL's algorithm, for place and time of scenario or ship.",
+        commands: &["cargo run --release -p precision -- --part sun"],
+        tables: &[PartTable {
+            part: "sun",
+            caption: "Direction to the sun against NREL's program",
+            scenes: &[],
+            methods: &[],
+        }],
+        exhibits: None,
+    },
+    DocumentRow {
+        id: "sky",
+        source: Source::Kolivand,
+        name: "Perez and Preetham's sky",
+        passage: "Perez Sky Model, eq. 5 to 9: luminance and chromaticity over the dome",
+        printed: "Perez's five parameters, with Preetham's fit to turbidity, times the values of the zenith.",
+        breaks: "The cosine in the exponent makes it infinite at and below the horizon. The zenith's luminance is negative for low suns, and there is no twilight and no night.",
+        product: "An atmosphere of molecules, haze and ozone round the Earth: finite for suns from -90 to 90 degrees. 42 of its skies are fitted to the camera's own picture.",
+        commands: &[
+            "cargo run --release -p precision -- --part skylight",
+            "cargo run --release -p precision -- documents --only sky",
+        ],
+        tables: &[PartTable {
+            part: "skylight",
+            caption: "Light on faces from a sky that is guessed from a window of it",
+            scenes: &[],
+            methods: &[],
+        }],
+        exhibits: Some(heavens::exhibits),
+    },
+    DocumentRow {
+        id: "z-gaf",
+        source: Source::Kolivand,
+        name: "Z-GaF shadow maps",
+        passage: "Z-Partitioning, Gaussian and Fogs Shadow Maps, eq. 10 to 14: the view's depth split, a map a part, Gaussian filter, fog",
+        printed: "Splits half way between logarithmic and uniform; each part's map holds its part of the view without the nearer one; a Gaussian of depth as upper bound of what is lit.",
+        breaks: "A map that holds its part of the view alone lacks what stands outside and throws its shadow in. Light along the view, as the authors say. Fog is a matter of colour, not of \
+                 shadow.",
+        product: "A shadow map a boat, fitted to what is seen of it, without an angle at which it fails.",
+        commands: &[
+            "cargo run --release -p precision -- --part shadow",
+            "cargo run --release -p precision -- documents --only z-gaf",
+        ],
+        tables: &[PartTable {
+            part: "shadow",
+            caption: "A boat's shadows on itself",
+            scenes: &["a boat at", "light along the view"],
+            methods: &["Z-GaF", "cascaded", "no shadow"],
+        }],
+        exhibits: Some(partitions::exhibits),
+    },
+    DocumentRow {
+        id: "table-1",
+        source: Source::Kolivand,
+        name: "Table 1",
+        passage: "Table 1: frames a second of plain maps, percentage closer filtering, cascades and Z-GaF maps at two resolutions",
+        printed: "Of plain maps' rate: filtering a half to two thirds, cascades two thirds, Z-GaF four fifths.",
+        breaks: "A rate without an error beside it: the fastest has the worst shadows.",
+        product: "The shape of the table in one run on a processor, with the error beside it.",
+        commands: &["cargo run --release -p precision -- --part shadow"],
+        tables: &[PartTable {
+            part: "shadow",
+            caption: "Table 1 in this run; the note has its rates and those as printed",
+            scenes: &["Table 1"],
+            methods: &[],
+        }],
+        exhibits: None,
+    },
+    DocumentRow {
+        id: "sky-on-objects",
+        source: Source::Kolivand,
+        name: "Sky colour on objects",
+        passage: "Interaction Between Sky colour and Object (RCC): the energy of each sky patch to all visible patches of the object",
+        printed: "Radiosity from patches of the sky to patches of the object, those of the sky that a patch does not see left out.",
+        breaks: "Which patches see which is found while it runs, and light converges over many frames.",
+        product: "What each corner of a model sees of the sky is found once a model; the sky's nine polynomials are the light of a frame.",
+        commands: &[
+            "cargo run --release -p precision -- --part ambient",
+            "cargo run --release -p precision -- --part hull",
+        ],
+        tables: &[
+            PartTable {
+                part: "ambient",
+                caption: "Light of the whole sky on a boat's corners",
+                scenes: &["corners"],
+                methods: &[],
+            },
+            PartTable {
+                part: "hull",
+                caption: "A boat as drawn against paths of light",
+                scenes: &["by day", "overcast"],
+                methods: &["lobes", "even sky", "Lambert"],
+            },
+        ],
+        exhibits: Some(heavens::on_objects),
+    },
+    DocumentRow {
+        id: "fog",
+        source: Source::Kolivand,
+        name: "Fog by distance",
+        passage: "Z-GaF, after eq. 10: fog with mode, colour and density, from a start to an end for each part of the view",
+        printed: "OpenGL's fog: far virtual things fade into the background between two distances.",
+        breaks: "Start and end are set by eye; nothing ties them to how far one sees.",
+        product: "Contrast falls as the visibility says (Koschmieder): 2 % is left at that distance. The same visibility lowers the horizon that is found and limits what can be seen.",
+        commands: &[
+            "cargo run --release -p precision -- documents --only fog",
+            "cargo run --release -p precision -- --part haze",
+        ],
+        tables: &[PartTable {
+            part: "haze",
+            caption: "By how much haze lowers the horizon that is found",
+            scenes: &[],
+            methods: &[],
+        }],
+        exhibits: Some(at_sea::fog),
+    },
+    DocumentRow {
+        id: "models-and-place",
+        source: Source::Kolivand,
+        name: "Models, and an interface for place and time",
+        passage: "Interaction, first paragraph: objects are OBJ models; a graphical interface sets location, date and time",
+        printed: "OBJ files are loaded, and a person types place, date and time.",
+        breaks: "OBJ has neither units nor axes nor parts. At sea nobody types place and time, and an exercise may last for an hour.",
+        product: "glTF models, whose parts have names of what can be hit. Place and time come from the scenario or from the ship's own receiver.",
+        commands: &[
+            "cargo run --release -p precision -- documents --only models-and-place",
+            "bowwave scenario check dusk-patrol",
+        ],
+        tables: &[],
+        exhibits: Some(place::exhibits),
+    },
+];
