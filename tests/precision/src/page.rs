@@ -11,7 +11,7 @@ h1{font-size:1.9rem}h2{margin-top:3rem;border-bottom:2px solid #ddd}h3{margin:1.
 table{border-collapse:collapse;font-size:.85rem;margin:.6rem 0}\
 td,th{border-bottom:1px solid #ddd;padding:.2rem .7rem .2rem 0;text-align:left;vertical-align:top}\
 td.n,th.n{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}\
-tr.default{background:#fff0d8}dl{display:grid;grid-template-columns:5rem 1fr;gap:.3rem .8rem}\
+tr.default{background:#fff0d8}dl{display:grid;grid-template-columns:6rem 1fr;gap:.3rem .8rem}\
 dt{font-weight:600}dd{margin:0}.box{overflow-x:auto}svg{max-width:100%;height:auto}\
 .bad{color:#b00020;font-weight:600}.small{font-size:.85rem;color:#555}h4{margin:2.2rem 0 .3rem;font-size:1.1rem}\
 .figures{display:flex;flex-wrap:wrap;gap:.8rem;align-items:flex-start}figure{margin:.4rem 0}\

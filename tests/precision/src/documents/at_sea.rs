@@ -21,7 +21,7 @@ use image::RgbImage;
 
 use super::{
     Cell, Exhibit, Figure, Line, Table, Workshop,
-    canvas::{SIZE, SeaShot, crop},
+    canvas::{SIZE, SeaShot, around, crop},
 };
 use crate::truth::files::{code, linear};
 
@@ -198,7 +198,7 @@ pub fn fire(_: &Workshop) -> Result<Vec<Exhibit>> {
     });
     Ok(vec![
         Exhibit::Table(Table {
-            caption: "What a lamp changes of the whole picture".into(),
+            caption: "Change of the whole picture by a lamp".into(),
             titles: vec!["drawn", "mean code", "pixels more than two codes brighter, %"],
             lines: lines.into(),
         }),
@@ -261,7 +261,7 @@ pub fn flashlight(_: &Workshop) -> Result<Vec<Exhibit>> {
     }
     Ok(vec![
         Exhibit::Table(Table {
-            caption: "What the beam changes of the whole picture".into(),
+            caption: "Change of the whole picture by the beam".into(),
             titles: vec!["beam", "visibility, km", "mean code", "pixels more than two codes brighter, %"],
             lines,
         }),
@@ -288,13 +288,6 @@ pub fn shadow_maps(_: &Workshop) -> Result<Vec<Exhibit>> {
         )?,
         Figure::new("A shadow map a boat", "a dhow whose own parts shade it", &crop(&with, part, 2))?,
     ])])
-}
-
-/// Pixels around the first boat of a scene.
-fn around(scene: &Scene) -> Result<[u32; 4]> {
-    let hull = scene.boats.first().and_then(|b| b.hull).context("the boat is out of the picture")?;
-    let (x, y) = (hull.x.saturating_sub(12), hull.y.saturating_sub(12));
-    Ok([x, y, (hull.width + 24).min(SIZE.0 - x), (hull.height + 40).min(SIZE.1 - y)])
 }
 
 /// A boat near, farther and far in two visibilities, and its contrast.
@@ -363,7 +356,7 @@ fn horizon(shot: &SeaShot) -> Vec3 {
     light / SIZE.0 as f32
 }
 
-/// Share of contrast to the horizon that is left, over pixels of a hull in the upper part of its rectangle, where drawing changed the picture.
+/// Share of contrast to the horizon that is left, over pixels in the upper part of a hull's rectangle that it covers wholly.
 fn contrast_left(
     [before, clear, hazy]: [&RgbImage; 3],
     [x, y, width, height]: [u32; 4],
@@ -374,7 +367,10 @@ fn contrast_left(
     for y in y..(y + height * 3 / 4).min(SIZE.1) {
         for x in x..(x + width).min(SIZE.0) {
             let seen = light(clear, x, y);
-            if (seen - light(before, x, y)).abs() > 0.04 {
+            let is_hull = |x, y| (light(clear, x, y) - light(before, x, y)).abs() > 0.03;
+            let sides = [(x, y), (x + 1, y), (x.saturating_sub(1), y), (x, y + 1), (x, y.saturating_sub(1))];
+            // Pixels of the edge hold some of the picture, which stays as it is.
+            if sides.into_iter().all(|(x, y)| is_hull(x.min(SIZE.0 - 1), y.min(SIZE.1 - 1))) {
                 let apart = f64::from(horizon.y) - seen;
                 both += apart * (f64::from(horizon.y) - light(hazy, x, y));
                 square += apart * apart;

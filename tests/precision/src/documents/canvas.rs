@@ -159,6 +159,13 @@ pub fn draw_over(before: &RgbImage, scene: &Scene, models: &[Model], phantoms: P
     RgbImage::from_raw(before.width(), before.height(), rgb).context("a frame of another size")
 }
 
+/// Pixels around the first boat of a scene.
+pub fn around(scene: &Scene) -> Result<[u32; 4]> {
+    let hull = scene.boats.first().and_then(|b| b.hull).context("the boat is out of the picture")?;
+    let (x, y) = (hull.x.saturating_sub(12), hull.y.saturating_sub(12));
+    Ok([x, y, (hull.width + 24).min(SIZE.0 - x), (hull.height + 40).min(SIZE.1 - y)])
+}
+
 /// A part of a picture, enlarged so many times without smoothing.
 pub fn crop(of: &RgbImage, [x, y, width, height]: [u32; 4], times: u32) -> RgbImage {
     let part = imageops::crop_imm(of, x, y, width, height).to_image();

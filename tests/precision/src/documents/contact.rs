@@ -108,8 +108,11 @@ pub fn exhibits(_: &Workshop) -> Result<Vec<Exhibit>> {
             Some(s) => s.albedo * 1.4 * own[i],
         })
     };
-    let mut figures =
-        vec![Figure::new("Rays", "a boat on a quay with a soft dark rim below it", &drawn(&truth))?];
+    let mut figures = vec![Figure::new(
+        "Rays at each vertex",
+        "a boat on a quay with a soft dark rim below it",
+        &drawn(&truth),
+    )?];
     for wanted in [
         "no contact shadow",
         "ratio of coefficients, as printed, 4 bands",

@@ -8,6 +8,9 @@ use image::{ExtendedColorType, ImageEncoder as _, RgbImage, codecs::png};
 
 use crate::page::{escape, number, time};
 
+/// Width of a picture on the page at most, pixels: two stand side by side.
+const PAGE_PX: u32 = 480;
+
 /// One cell of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
@@ -122,7 +125,7 @@ impl Exhibit {
                     writeln!(
                         html,
                         "<figure style=\"max-width:{}px\"><img alt=\"{}\" src=\"{}\"><figcaption>{}</figcaption></figure>",
-                        figure.width,
+                        figure.width.min(PAGE_PX),
                         escape(&figure.alt),
                         figure.address,
                         escape(&figure.caption)

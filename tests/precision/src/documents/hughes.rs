@@ -36,7 +36,7 @@ pub const ROWS: &[DocumentRow] = &[
         breaks: "A virtual light may be many times as strong as the real one: S of 0 to 1 at most doubles a pixel. Without the gamma undone light adds up wrongly. A sum that is not \
                  limited wraps in eight bits. By night D is noise, and D * S is noise made bright.",
         product: "In linear light: the picture over the light that it was taken in is the reflectance, held between .02 and .6, and in the dark it is grey paint's; that times the \
-                  lamps' light is added, in a target that holds more than white.",
+                  lamps' light is added, in a target that holds more than white. In half dark the grey costs colour and texture, as the pictures show.",
         commands: &[
             "cargo run --release -p precision -- --part relight",
             "cargo run --release -p precision -- documents --only equation-1",
@@ -60,7 +60,7 @@ pub const ROWS: &[DocumentRow] = &[
         product: "Flames and smoke are functions of time. A fire is one lamp at half the height of its flames, as strong as its heat; it lights hulls, sea, air and gun.",
         commands: &[
             "cargo run --release -p precision -- --part fires",
-            "bowwave play tests/data/night-scene.toml --headless --duration 20 --stills 300 --out target/night",
+            "bowwave play tests/data/night-scene.toml --aim trained --headless --duration 20 --stills 300 --out target/night",
         ],
         tables: &[PartTable {
             part: "fires",
@@ -81,7 +81,7 @@ pub const ROWS: &[DocumentRow] = &[
                   know it.",
         commands: &[
             "cargo run --release -p precision -- --part beam",
-            "bowwave play night-intruder --headless --duration 10 --stills 200 --out target/intruder",
+            "bowwave play night-intruder --aim expert --headless --duration 10 --stills 200 --out target/intruder",
         ],
         tables: &[PartTable {
             part: "beam",
@@ -177,7 +177,7 @@ pub const ROWS: &[DocumentRow] = &[
         passage: "5: a concave polygon traced in the picture; the homography of the marker's plane gives its shape in the world; triangulation",
         printed: "Each corner's place on the plane Z = 0 is solved for by two equations with two unknowns; the polygon is then triangulated.",
         breaks: "A plane that is seen edge on makes the two equations nearly the same: a pixel becomes metres. Only planes can be traced.",
-        product: "What moves with the camera is traced as an outline in the picture, by hand or found by itself, and needs no plane. The table is that of the outlines.",
+        product: "The gun, which moves with the camera, is traced as an outline in the picture, by hand or found by itself, and needs no plane. The table is that of the outlines.",
         commands: &[
             "bowwave calibrate phantom turned.mcap --outline \"barrel=560,720 720,720 660,400 620,400\"",
             "cargo run --release -p precision -- --part phantom",
@@ -222,7 +222,7 @@ pub const ROWS: &[DocumentRow] = &[
         ],
         tables: &[PartTable {
             part: "seeing",
-            caption: "From when on something could be seen",
+            caption: "Thresholds of sight, and distances that follow from them",
             scenes: &[],
             methods: &[],
         }],

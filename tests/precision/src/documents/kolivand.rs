@@ -27,7 +27,7 @@ pub const ROWS: &[DocumentRow] = &[
         name: "Perez and Preetham's sky",
         passage: "Perez Sky Model, eq. 5 to 9: luminance and chromaticity over the dome",
         printed: "Perez's five parameters, with Preetham's fit to turbidity, times the values of the zenith.",
-        breaks: "The cosine in the exponent makes it infinite at and below the horizon. The zenith's luminance is negative for low suns, and there is no twilight and no night.",
+        breaks: "The cosine in the exponent makes it infinite at and below the horizon. In hazy air the zenith's luminance is negative for a low sun, and there is no twilight and no night.",
         product: "An atmosphere of molecules, haze and ozone round the Earth: finite for suns from -90 to 90 degrees. 42 of its skies are fitted to the camera's own picture.",
         commands: &[
             "cargo run --release -p precision -- --part skylight",
@@ -86,7 +86,7 @@ pub const ROWS: &[DocumentRow] = &[
         passage: "Interaction Between Sky colour and Object (RCC): the energy of each sky patch to all visible patches of the object",
         printed: "Radiosity from patches of the sky to patches of the object, those of the sky that a patch does not see left out.",
         breaks: "Which patches see which is found while it runs, and light converges over many frames.",
-        product: "What each corner of a model sees of the sky is found once a model; the sky's nine polynomials are the light of a frame.",
+        product: "The part of the sky that each corner of a model sees is found once a model; the sky's nine polynomials are the light of a frame.",
         commands: &[
             "cargo run --release -p precision -- --part ambient",
             "cargo run --release -p precision -- --part hull",
@@ -121,7 +121,7 @@ pub const ROWS: &[DocumentRow] = &[
         ],
         tables: &[PartTable {
             part: "haze",
-            caption: "By how much haze lowers the horizon that is found",
+            caption: "Lowering of the horizon that is found, by haze",
             scenes: &[],
             methods: &[],
         }],

@@ -22,12 +22,21 @@ const FILES: [(&str, &[u8]); 2] = [
     ("textured.glb", include_bytes!("../../../fuzz/corpus/model/textured.glb")),
 ];
 
-/// Places and times: degrees north and east, and a time as TOML has it with its day and seconds.
-const MOMENTS: [(f64, f64, &str, (i32, u8, u8, f64)); 4] = [
-    (26.5, 56.4, "2026-01-06T05:30:00Z", (2026, 1, 6, 19_800.0)),
-    (1.56, 103.64, "2014-01-01T04:00:00Z", (2014, 1, 1, 14_400.0)),
-    (48.858, 2.294, "2012-10-06T14:03:00Z", (2012, 10, 6, 50_580.0)),
-    (-54.8, -68.3, "2026-06-21T15:00:00Z", (2026, 6, 21, 54_000.0)),
+/// A place and a time.
+struct Sighting {
+    /// Degrees north and east.
+    place: (f64, f64),
+    /// The time as TOML has it.
+    utc: &'static str,
+    /// The same as year, month, day and second of the day.
+    day: (i32, u8, u8, f64),
+}
+
+const SIGHTINGS: [Sighting; 4] = [
+    Sighting { place: (26.5, 56.4), utc: "2026-01-06T05:30:00Z", day: (2026, 1, 6, 19_800.0) },
+    Sighting { place: (1.56, 103.64), utc: "2014-01-01T04:00:00Z", day: (2014, 1, 1, 14_400.0) },
+    Sighting { place: (48.858, 2.294), utc: "2012-10-06T14:03:00Z", day: (2012, 10, 6, 50_580.0) },
+    Sighting { place: (-54.8, -68.3), utc: "2026-06-21T15:00:00Z", day: (2026, 6, 21, 54_000.0) },
 ];
 
 /// Both tables.
@@ -64,18 +73,15 @@ fn models() -> Result<Table> {
 }
 
 /// The sun of a scenario that says place and time.
-fn of_scenario(latitude: f64, longitude: f64, utc: &str) -> Result<DVec3> {
+fn of_scenario(Sighting { place: (latitude, longitude), utc, .. }: &Sighting) -> Result<DVec3> {
     let text =
         format!("[light]\nlatitude_deg = {latitude:?}\nlongitude_deg = {longitude:?}\nutc = \"{utc}\"\n");
     Ok(Scenario::parse(&text, "place and time")?.daylight.sun_direction)
 }
 
 /// The sun of the lines that a receiver sends.
-fn of_ship(
-    latitude: f64,
-    longitude: f64,
-    (year, month, day, second): (i32, u8, u8, f64),
-) -> Result<(DVec3, String)> {
+fn of_ship(sighting: &Sighting) -> Result<(DVec3, String)> {
+    let ((latitude, longitude), (year, month, day, second)) = (sighting.place, sighting.day);
     let fix = ShipFix {
         arrival: Time::from_ns(0),
         place: Place::new(latitude, longitude),
@@ -96,14 +102,14 @@ fn of_ship(
 
 fn suns() -> Result<Table> {
     let mut lines = Vec::new();
-    for (latitude, longitude, utc, day) in MOMENTS {
-        let (typed, (told, nmea)) =
-            (of_scenario(latitude, longitude, utc)?, of_ship(latitude, longitude, day)?);
+    for sighting in &SIGHTINGS {
+        let (typed, (sent, nmea)) = (of_scenario(sighting)?, of_ship(sighting)?);
+        let ((latitude, longitude), utc) = (sighting.place, sighting.utc);
         lines.push(Line::new([
             format!("{latitude} N {longitude} E, {utc}").into(),
             typed.x.atan2(typed.y).to_degrees().rem_euclid(360.0).into(),
             typed.z.asin().to_degrees().into(),
-            typed.angle_between(told).to_degrees().into(),
+            typed.angle_between(sent).to_degrees().into(),
             nmea.into(),
         ]));
     }

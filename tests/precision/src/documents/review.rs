@@ -26,8 +26,8 @@ const SCENARIO: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/crowd-ahead
 /// Boats of a tick: name, model, pose.
 type Placed = Vec<(String, Model, RigidPose)>;
 
-/// What a replay told.
-struct Told {
+/// A replay.
+struct ReviewedRun {
     replayed: Replayed,
     records: Vec<ShotRecord>,
     placed: Placed,
@@ -44,9 +44,9 @@ fn run(program: &Path, words: &[&str], paths: &[&Path]) -> Result<()> {
     Ok(())
 }
 
-fn replayed(recording: &Path) -> Result<Told> {
+fn replayed(recording: &Path) -> Result<ReviewedRun> {
     let (mut records, mut placed, mut ticks) = (Vec::new(), Vec::new(), 0);
-    let replayed = replay_noting(recording, &mut |world, of_tick, _| {
+    let result = replay_noting(recording, &mut |world, of_tick, _| {
         records.extend_from_slice(of_tick);
         ticks += 1;
         if let (true, Some(running)) = (ticks == FRAME, world.running()) {
@@ -57,7 +57,9 @@ fn replayed(recording: &Path) -> Result<Told> {
             }));
         }
     })?;
-    Ok(Told { replayed, records, placed })
+    // Rounds come as they end; the journal has them as they were fired.
+    records.sort_by_key(|record: &ShotRecord| record.shot);
+    Ok(ReviewedRun { replayed: result, records, placed })
 }
 
 /// Runs, replays, and shows the run from the gun, from elsewhere and from above.
@@ -77,16 +79,17 @@ pub fn exhibits(workshop: &Workshop) -> Result<Vec<Exhibit>> {
     run(&workshop.program, &[&words[..], &["--scenario"]].concat(), &[scenario, Path::new("--out"), &out])?;
     let recording = out.join("recording.mcap");
     run(&workshop.program, &["replay", "--chart"], &[&chart, &recording])?;
-    let told = replayed(&recording)?;
+    let review = replayed(&recording)?;
     let summary: serde_json::Value = serde_json::from_slice(&std::fs::read(out.join("summary.json"))?)?;
     let journal =
         read_shots(&out.join("hits.sqlite"), &ShotFilter { runs: RunSelection::Latest, hits_only: false })?;
-    let logged: Vec<ShotRecord> = journal.into_iter().map(|shot| shot.record).collect();
+    let mut logged: Vec<ShotRecord> = journal.into_iter().map(|shot| shot.record).collect();
+    logged.sort_by_key(|record| record.shot);
     let still = out.join(format!("frame-{FRAME:05}.png"));
     let seen = image::open(&still).with_context(|| still.display().to_string())?.to_rgb8();
     let figures = vec![
         Figure::new(format!("Frame {FRAME} as the gunner saw it"), "boats ahead of the gun", &seen)?,
-        elsewhere(&told.placed)?,
+        elsewhere(&review.placed)?,
         Figure::of_svg(
             "The same run from above: bowwave replay --chart",
             "tracks of boats around the gun",
@@ -94,26 +97,26 @@ pub fn exhibits(workshop: &Workshop) -> Result<Vec<Exhibit>> {
         ),
     ];
     Ok(vec![
-        Exhibit::Table(compared(&told, &logged, &summary, scenario_of(&recording)?.boats.len())),
+        Exhibit::Table(compared(&review, &logged, &summary, scenario_of(&recording)?.boats.len())),
         Exhibit::Figures(figures),
     ])
 }
 
 /// The run against its replay.
-fn compared(told: &Told, logged: &[ShotRecord], summary: &serde_json::Value, boats: usize) -> Table {
+fn compared(review: &ReviewedRun, logged: &[ShotRecord], summary: &serde_json::Value, boats: usize) -> Table {
     let text = |key: &str| summary[key].as_str().unwrap_or("none").to_owned();
-    let digest = told.replayed.digest;
+    let digest = review.replayed.digest;
     let farthest = |of: fn(&ShotRecord) -> DVec3| {
-        let pairs = told.records.iter().zip(logged);
+        let pairs = review.records.iter().zip(logged);
         pairs.map(|(a, b)| of(a).distance(of(b))).fold(0.0, f64::max)
     };
-    let late = told
+    let late = review
         .records
         .iter()
         .zip(logged)
         .map(|(a, b)| (a.fired.ns() - b.fired.ns()).abs() as f64 * 1e-9)
         .fold(0.0, f64::max);
-    let same = if told.replayed.differs_from.is_none() { "all" } else { "not all" };
+    let same = if review.replayed.differs_from.is_none() { "all" } else { "not all" };
     let line = |what: &str, run: String, replay: String| Line::new([what.into(), run.into(), replay.into()]);
     Table {
         caption: format!(
@@ -121,12 +124,12 @@ fn compared(told: &Told, logged: &[ShotRecord], summary: &serde_json::Value, boa
         ),
         titles: vec!["quantity", "run", "replay"],
         lines: vec![
-            line("ticks", summary["frames"].to_string(), told.replayed.ticks.to_string()),
+            line("ticks", summary["frames"].to_string(), review.replayed.ticks.to_string()),
             line("ticks whose records and scenes are those logged", "-".into(), same.into()),
-            line("inputs that the recording lacks", "-".into(), told.replayed.missing.to_string()),
+            line("inputs that the recording lacks", "-".into(), review.replayed.missing.to_string()),
             line("hash of all records", text("records_digest"), format!("{:016x}", digest.records.get())),
             line("hash of all scenes", text("scenes_digest"), format!("{:016x}", digest.scenes.get())),
-            line("rounds in journal and replay", logged.len().to_string(), told.records.len().to_string()),
+            line("rounds in journal and replay", logged.len().to_string(), review.records.len().to_string()),
             line(
                 "farthest that a round's muzzle is apart, m",
                 "-".into(),
@@ -145,7 +148,7 @@ fn compared(told: &Told, logged: &[ShotRecord], summary: &serde_json::Value, boa
 /// The boats of the replay from a place beside them, 25 m up.
 fn elsewhere(placed: &Placed) -> Result<Figure> {
     const HIGH_M: f64 = 25.0;
-    const OFF_M: f64 = 160.0;
+    const OFF_M: f64 = 150.0;
     let mut shot = SeaShot::new([35.0, 215.0], 20_000.0)?;
     let mut near: Vec<&(String, Model, RigidPose)> = placed.iter().collect();
     near.sort_by(|a, b| a.2.position.length().total_cmp(&b.2.position.length()));
@@ -157,7 +160,7 @@ fn elsewhere(placed: &Placed) -> Result<Figure> {
     let eye = middle + across * OFF_M;
     let ahead = (middle - eye).normalize_or(DVec2::Y);
     shot.camera.position = eye.extend(HIGH_M);
-    shot.camera.world_from_camera = look(ahead.x.atan2(ahead.y), -(HIGH_M / OFF_M).atan() * 0.6, 0.0);
+    shot.camera.world_from_camera = look(ahead.x.atan2(ahead.y), -(HIGH_M / OFF_M).atan() * 1.2, 0.0);
     // Another view has no picture of the sea: sky over water, as the camera's colours have them.
     shot.picture = plain(&shot);
     let models: Vec<Model> = near.iter().map(|b| b.1.clone()).collect();

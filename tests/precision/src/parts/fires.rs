@@ -104,7 +104,7 @@ fn places(near_m: f64, far_m: f64) -> Vec<(DVec3, DVec3)> {
     let place = |i: u64| {
         let away = DVec2::from_angle(even(4 * i) * std::f64::consts::TAU);
         let distance = near_m + (far_m - near_m) * even(4 * i + 1);
-        if i % 2 == 0 {
+        if i.is_multiple_of(2) {
             ((away * distance).extend(-0.8), DVec3::Z)
         } else {
             ((away * distance).extend(2.0 * even(4 * i + 2) - 0.8), -away.extend(0.0))
