@@ -27,7 +27,7 @@ pub const ROWS: &[DocumentRow] = &[
         name: "Perez and Preetham's sky",
         passage: "Perez Sky Model, eq. 5 to 9: luminance and chromaticity over the dome",
         printed: "Perez's five parameters, with Preetham's fit to turbidity, times the values of the zenith.",
-        breaks: "The cosine in the exponent makes it infinite at and below the horizon. In hazy air the zenith's luminance is negative for a low sun, and there is no twilight and no night.",
+        breaks: "The cosine in the exponent makes it infinite at and below the horizon. In hazy air the zenith's luminance is negative once the sun is down: there is no twilight and no night.",
         product: "An atmosphere of molecules, haze and ozone round the Earth: finite for suns from -90 to 90 degrees. 42 of its skies are fitted to the camera's own picture.",
         commands: &[
             "cargo run --release -p precision -- --part skylight",
