@@ -21,7 +21,7 @@ pub enum Kind {
     Overcast,
 }
 
-/// Which of the clear skies is looked at: a turbidity of about three.
+/// Which of the clear skies is looked at: a turbidity of 1.6.
 const TURBIDITY: usize = 2;
 /// Light that comes out of the sea over the light that falls on it (Mobley 1994).
 const WATER_ALBEDO: f32 = 0.015;
