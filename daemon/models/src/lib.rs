@@ -1,7 +1,8 @@
 //! Boats: parametric models built here, glTF and pictures read from anywhere.
 //!
 //! Every model reaches the trainer the same way: the built-in boats are written as binary glTF by [`build_glb`] and read by
-//! the loader that reads a user's own file. [`resolve`] turns what a scenario names into a model.
+//! the loader that reads a user's own file. [`resolve`] turns what a scenario names into a model. [`load_parts`] and [`parts_glb`] read and
+//! write plain triangles by their parts' names, as models of the own gun are.
 
 #![forbid(unsafe_code)]
 
@@ -20,9 +21,9 @@ use bowwave_core::model::Model;
 
 pub use crate::{
     boats::BoatModels,
-    build::{Boat, build_glb},
+    build::{Boat, build_glb, parts_glb},
     error::ModelError,
-    load::{load, load_glb},
+    load::{PartMesh, load, load_glb, load_parts},
     quad::{Bow, FRIGATE_QUAD, QuadSpec, Rect, frigate_quad, load_quad, quad, side_view},
 };
 

@@ -2,7 +2,10 @@
 //!
 //! glTF has y up and +z forward, so that boat (x forward, y to port, z up) becomes glTF (y, z, x): a rotation.
 
-use std::{borrow::Cow, collections::BTreeMap};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, HashMap},
+};
 
 use bowwave_core::model::Zone;
 use glam::Vec3;
@@ -19,6 +22,7 @@ use gltf::{
 };
 
 use super::assembly::{Assembly, Primitive};
+use crate::load::PartMesh;
 
 /// From boat axes to glTF's.
 fn to_gltf(p: Vec3) -> [f32; 3] {
@@ -35,9 +39,47 @@ pub(crate) fn write(name: &str, assembly: &Assembly) -> Vec<u8> {
         meshes.entry(zone).or_default().push(written);
     }
     for (zone, primitives) in meshes {
-        writer.part(zone, primitives);
+        writer.part(zone.name(), primitives);
     }
     writer.finish(name)
+}
+
+/// The bytes of a GLB file of plain triangles: a node for each part, named after it, corners in glTF's axes as they are given (to the
+/// nearest f32). Without normals: each triangle is flat.
+pub fn parts_glb(parts: &[PartMesh]) -> Vec<u8> {
+    let mut writer = Writer::default();
+    for part in parts.iter().filter(|part| !part.triangles.is_empty()) {
+        let (mut positions, mut places): (Vec<[f32; 3]>, HashMap<[u32; 3], u32>) = Default::default();
+        let mut indices = Vec::with_capacity(3 * part.triangles.len());
+        for corner in part.triangles.iter().flatten() {
+            let corner = corner.as_vec3().to_array();
+            indices.push(*places.entry(corner.map(f32::to_bits)).or_insert_with(|| {
+                positions.push(corner);
+                positions.len() as u32 - 1
+            }));
+        }
+        let attributes = BTreeMap::from([(Valid(Semantic::Positions), writer.positions(&positions))]);
+        let indices = writer.indices(&indices);
+        writer.part(&part.name, vec![primitive(attributes, indices, None)]);
+    }
+    writer.finish("parts")
+}
+
+/// A primitive of triangles.
+fn primitive(
+    attributes: BTreeMap<json::validation::Checked<Semantic>, Index<Accessor>>,
+    indices: Index<Accessor>,
+    material: Option<Index<json::Material>>,
+) -> json::mesh::Primitive {
+    json::mesh::Primitive {
+        attributes,
+        extensions: None,
+        extras: None,
+        indices: Some(indices),
+        material,
+        mode: Valid(Mode::Triangles),
+        targets: None,
+    }
 }
 
 #[derive(Default)]
@@ -51,6 +93,21 @@ impl Writer {
     fn primitive(&mut self, p: &Primitive) -> json::mesh::Primitive {
         let positions: Vec<[f32; 3]> = p.positions.iter().map(|&v| to_gltf(v)).collect();
         let normals: Vec<[f32; 3]> = p.normals.iter().map(|&v| to_gltf(v)).collect();
+        let position = self.positions(&positions);
+        let normal = self.accessor(
+            normals.iter().flatten().flat_map(|v| v.to_le_bytes()),
+            (normals.len(), Type::Vec3, ComponentType::F32),
+            Target::ArrayBuffer,
+        );
+        let indices = self.indices(&p.indices);
+        let material = self.material(p);
+        let attributes =
+            BTreeMap::from([(Valid(Semantic::Positions), position), (Valid(Semantic::Normals), normal)]);
+        primitive(attributes, indices, Some(material))
+    }
+
+    /// Corners, with the bounds that glTF asks for.
+    fn positions(&mut self, positions: &[[f32; 3]]) -> Index<Accessor> {
         let low = positions.iter().fold([f32::MAX; 3], |a, b| [0, 1, 2].map(|i| f32::min(a[i], b[i])));
         let high = positions.iter().fold([f32::MIN; 3], |a, b| [0, 1, 2].map(|i| f32::max(a[i], b[i])));
         let position = self.accessor(
@@ -62,30 +119,12 @@ impl Writer {
             accessor.min = Some(low.as_slice().into());
             accessor.max = Some(high.as_slice().into());
         }
-        let normal = self.accessor(
-            normals.iter().flatten().flat_map(|v| v.to_le_bytes()),
-            (normals.len(), Type::Vec3, ComponentType::F32),
-            Target::ArrayBuffer,
-        );
-        let indices = self.indices(p);
-        let material = self.material(p);
-        json::mesh::Primitive {
-            attributes: BTreeMap::from([
-                (Valid(Semantic::Positions), position),
-                (Valid(Semantic::Normals), normal),
-            ]),
-            extensions: None,
-            extras: None,
-            indices: Some(indices),
-            material: Some(material),
-            mode: Valid(Mode::Triangles),
-            targets: None,
-        }
+        position
     }
 
     /// Two bytes an index where that is enough.
-    fn indices(&mut self, p: &Primitive) -> Index<Accessor> {
-        let narrow: Result<Vec<u16>, _> = p.indices.iter().map(|&i| u16::try_from(i)).collect();
+    fn indices(&mut self, indices: &[u32]) -> Index<Accessor> {
+        let narrow: Result<Vec<u16>, _> = indices.iter().map(|&i| u16::try_from(i)).collect();
         match narrow {
             Ok(narrow) => self.accessor(
                 narrow.iter().flat_map(|v| v.to_le_bytes()),
@@ -93,8 +132,8 @@ impl Writer {
                 Target::ElementArrayBuffer,
             ),
             Err(_) => self.accessor(
-                p.indices.iter().flat_map(|v| v.to_le_bytes()),
-                (p.indices.len(), Type::Scalar, ComponentType::U32),
+                indices.iter().flat_map(|v| v.to_le_bytes()),
+                (indices.len(), Type::Scalar, ComponentType::U32),
                 Target::ElementArrayBuffer,
             ),
         }
@@ -155,16 +194,15 @@ impl Writer {
         })
     }
 
-    fn part(&mut self, zone: Zone, primitives: Vec<json::mesh::Primitive>) {
+    fn part(&mut self, name: &str, primitives: Vec<json::mesh::Primitive>) {
         let mesh = self.root.push(json::Mesh {
             extensions: None,
             extras: None,
-            name: Some(zone.name().to_owned()),
+            name: Some(name.to_owned()),
             primitives,
             weights: None,
         });
-        let node =
-            json::Node { mesh: Some(mesh), name: Some(zone.name().to_owned()), ..json::Node::default() };
+        let node = json::Node { mesh: Some(mesh), name: Some(name.to_owned()), ..json::Node::default() };
         let node = self.root.push(node);
         self.parts.push(node);
     }

@@ -13,6 +13,8 @@ mod rhib;
 mod skiff;
 mod solid;
 
+pub use glb::parts_glb;
+
 /// A boat that the project builds itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Boat {

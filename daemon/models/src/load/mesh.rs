@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Deepest tree of nodes.
-const DEPTH_MAX: usize = 64;
+pub(super) const DEPTH_MAX: usize = 64;
 /// glTF (y up, +z forward, +x to port) to boat (x forward, y to port, z up): a rotation, x <- z, y <- x, z <- y.
 const BOAT_FROM_GLTF: Mat3 = Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::X);
 
@@ -36,7 +36,21 @@ struct MeshPiece {
     picture: Option<usize>,
 }
 
-/// Reads the default scene; the first where none is the default; all nodes that are nobody's child where there is none.
+/// Nodes of the default scene; of the first where none is the default; all that are nobody's child where there is none.
+pub(super) fn scene_roots(document: &gltf::Document) -> Vec<gltf::Node<'_>> {
+    if let Some(scene) = document.default_scene().or_else(|| document.scenes().next()) {
+        return scene.nodes().collect();
+    }
+    let mut is_child = vec![false; document.nodes().len()];
+    for child in document.nodes().flat_map(|n| n.children()) {
+        if let Some(is_child) = is_child.get_mut(child.index()) {
+            *is_child = true;
+        }
+    }
+    document.nodes().filter(|n| is_child.get(n.index()) == Some(&false)).collect()
+}
+
+/// Reads all that the default scene holds.
 pub(crate) fn gather(source: &ModelSource<'_>) -> Result<GatheredMesh, ModelError> {
     let mut walk = NodeWalk {
         source,
@@ -47,22 +61,8 @@ pub(crate) fn gather(source: &ModelSource<'_>) -> Result<GatheredMesh, ModelErro
         triangles: 0,
         seen: vec![false; source.root().nodes.len()],
     };
-    let document = &source.document;
-    match document.default_scene().or_else(|| document.scenes().next()) {
-        Some(scene) => {
-            for node in scene.nodes() {
-                walk.node(&node, Mat4::IDENTITY, Zone::Hull, 0)?;
-            }
-        }
-        None => {
-            let mut is_child = vec![false; walk.seen.len()];
-            for child in document.nodes().flat_map(|n| n.children()) {
-                is_child[child.index()] = true;
-            }
-            for node in document.nodes().filter(|n| !is_child[n.index()]) {
-                walk.node(&node, Mat4::IDENTITY, Zone::Hull, 0)?;
-            }
-        }
+    for node in scene_roots(&source.document) {
+        walk.node(&node, Mat4::IDENTITY, Zone::Hull, 0)?;
     }
     walk.finish()
 }
@@ -119,7 +119,7 @@ impl NodeWalk<'_, '_> {
         zone: Zone,
     ) -> Result<(), ModelError> {
         let source = self.source;
-        if matches!(primitive.mode(), Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+        if !is_surface(primitive) {
             return Ok(());
         }
         let surface = self.pictures.surface(source, &primitive.material())?;
@@ -259,18 +259,9 @@ impl Attributes {
         uv_set: Option<u32>,
         total: &mut u64,
     ) -> Result<Self, ModelError> {
-        let get = |semantic: Semantic| {
-            primitive
-                .attributes()
-                .find(|(s, _)| *s == semantic)
-                .map(|(_, a)| gltf::json::Index::new(a.index() as u32))
-        };
-        let at = get(Semantic::Positions).ok_or_else(|| source.error("a mesh has no positions"))?;
-        *total = total.saturating_add(source.count(at));
-        limit(source.file, "the number of vertices", *total, VERTICES_MAX)?;
-        let positions = source.floats(at, &[Type::Vec3])?;
+        let positions = positions(source, primitive, total)?;
         let optional = |semantic: Semantic, types: &[Type]| -> Result<Option<Vec<[f32; 4]>>, ModelError> {
-            let Some(index) = get(semantic) else { return Ok(None) };
+            let Some(index) = attribute(primitive, &semantic) else { return Ok(None) };
             let values = source.floats(index, types)?;
             if values.len() != positions.len() {
                 let (a, b) = (values.len(), positions.len());
@@ -308,8 +299,35 @@ impl Attributes {
     }
 }
 
+/// The accessor of an attribute.
+fn attribute(
+    primitive: &gltf::Primitive<'_>,
+    semantic: &Semantic,
+) -> Option<gltf::json::Index<gltf::json::Accessor>> {
+    let (_, accessor) = primitive.attributes().find(|(s, _)| s == semantic)?;
+    Some(gltf::json::Index::new(accessor.index() as u32))
+}
+
+/// Corners of a primitive in its own axes; `total` counts those of the file.
+pub(super) fn positions(
+    source: &ModelSource<'_>,
+    primitive: &gltf::Primitive<'_>,
+    total: &mut u64,
+) -> Result<Vec<[f32; 4]>, ModelError> {
+    let at =
+        attribute(primitive, &Semantic::Positions).ok_or_else(|| source.error("a mesh has no positions"))?;
+    *total = total.saturating_add(source.count(at));
+    limit(source.file, "the number of vertices", *total, VERTICES_MAX)?;
+    source.floats(at, &[Type::Vec3])
+}
+
+/// Whether a primitive has triangles; points and lines are left out.
+pub(super) fn is_surface(primitive: &gltf::Primitive<'_>) -> bool {
+    !matches!(primitive.mode(), Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip)
+}
+
 /// The triangles of a list, strip or fan.
-fn triangles(
+pub(super) fn triangles(
     source: &ModelSource<'_>,
     primitive: &gltf::Primitive<'_>,
     vertices: usize,

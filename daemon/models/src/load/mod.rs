@@ -3,6 +3,7 @@
 mod accessor;
 mod atlas;
 mod mesh;
+mod parts;
 mod source;
 mod surface;
 
@@ -10,6 +11,7 @@ use std::path::Path;
 
 use bowwave_core::model::{Model, Zone};
 
+pub use self::parts::{PartMesh, load_parts};
 pub(crate) use self::{source::read_bounded, surface::decode_bounded as decode_picture};
 use crate::{error::ModelError, finish::zone_index};
 
