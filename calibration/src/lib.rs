@@ -33,6 +33,7 @@
 
 pub mod capture;
 mod file;
+pub mod gun;
 pub mod outline;
 pub mod report;
 mod rolling_shutter;

@@ -3,6 +3,8 @@
 //! A pixel that the gun covers by a share `a` changes by `1 - a` times what the sea beside it does. So the gun's edge lies where a pixel's
 //! deviation over all pictures is half of that of the sea a few pixels further out. A sky keeps still as well where the horizon never comes; its
 //! end is no edge in most pictures, and so it is told from the gun.
+//!
+//! Where there is a model of the gun, [`outlines_of`] says how it is seen.
 
 use bowwave_core::{event::Picture, own_ship::Phantom};
 use glam::DVec2;
@@ -12,6 +14,10 @@ use contour::{closed_contours, simplified};
 use crate::target::Plane;
 
 mod contour;
+mod cover;
+mod model;
+
+pub use model::outlines_of;
 
 /// Pictures that are needed: fewer tell a pixel's deviation by no more than a tenth.
 pub const PICTURES_LEAST: u32 = 60;
