@@ -35,6 +35,8 @@ pub mod capture;
 mod file;
 pub mod gun;
 pub mod outline;
+pub mod plane;
+pub mod polygon;
 pub mod report;
 mod rolling_shutter;
 mod sight;

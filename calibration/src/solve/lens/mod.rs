@@ -21,7 +21,7 @@ pub use judge::Missing;
 pub(crate) use judge::enough;
 pub use model::LensModel;
 pub use start::BoardPose;
-pub(crate) use start::{homography, pose_from};
+pub(crate) use start::{conditioned, homography, pose_from};
 
 use crate::alignment::LensEvidence;
 use adjust::{AdjustState, Adjusted, adjust};

@@ -33,6 +33,12 @@ fn even(points: impl Iterator<Item = DVec2> + Clone) -> Option<(DVec2, f64)> {
 
 /// Homography from the board to `seen` by the direct linear transform (Hartley & Zisserman 2004, alg. 4.2).
 pub(crate) fn homography(pairs: &[(DVec2, DVec2)]) -> Option<Matrix3<f64>> {
+    conditioned(pairs).map(|(h, _)| h)
+}
+
+/// The same with the condition number of its equations: the ratio of the largest of their singular values to the least but one, the least
+/// being that of the homography itself.
+pub(crate) fn conditioned(pairs: &[(DVec2, DVec2)]) -> Option<(Matrix3<f64>, f64)> {
     if pairs.len() < 4 {
         return None;
     }
@@ -55,7 +61,10 @@ pub(crate) fn homography(pairs: &[(DVec2, DVec2)]) -> Option<Matrix3<f64>> {
     let middle = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]);
     let t = |shift: DVec2, s: f64| Matrix3::new(s, 0.0, -s * shift.x, 0.0, s, -s * shift.y, 0.0, 0.0, 1.0);
     let h = t(seen, seen_scale).try_inverse()? * middle * t(board, board_scale);
-    h.iter().all(|v| v.is_finite()).then_some(h)
+    let mut squares = eigen.eigenvalues.as_slice().to_vec();
+    squares.sort_by(f64::total_cmp);
+    let condition = (squares[8] / squares[1].max(0.0)).sqrt();
+    h.iter().all(|v| v.is_finite()).then_some((h, condition))
 }
 
 /// Focal length in pixels from the homographies of all views, the principal point held in the picture's middle (Zhang 2000, eq. 3
