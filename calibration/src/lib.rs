@@ -45,5 +45,7 @@ mod solve;
 pub mod target;
 pub mod wizard;
 
-pub use file::{CalibrationError, CalibrationFile, Date, Provenance, SIMULATED, history, parse, to_toml};
+pub use file::{
+    CalibrationError, CalibrationFile, Date, POLYGONS_MOST, Provenance, SIMULATED, history, parse, to_toml,
+};
 pub use solve::{alignment, boresight, lens, trigger};

@@ -5,13 +5,12 @@
 
 use std::{
     env, fs,
-    io::{BufRead, BufReader},
-    process::{Child, Command, Stdio},
+    process::{Child, Command},
     thread,
     time::{Duration, Instant},
 };
 
-use bowwave_tests::{bowwave, expect_code, root};
+use bowwave_tests::{Ended, bowwave, desktop, expect_code, root};
 use serde_json::Value;
 use x11rb::{
     connection::Connection,
@@ -32,30 +31,6 @@ const LIMIT_S: f64 = 30.0;
 const BUTTON_PRESS: u8 = 4;
 const BUTTON_RELEASE: u8 = 5;
 const MOTION: u8 = 6;
-
-/// Ends with its owner.
-struct Ended(Child);
-
-impl Drop for Ended {
-    fn drop(&mut self) {
-        if self.0.kill().is_ok() {
-            let _ = self.0.wait();
-        }
-    }
-}
-
-/// A virtual desktop; `None` where Xvfb is not installed.
-fn desktop() -> Option<(Ended, String)> {
-    let mut child = Command::new("Xvfb")
-        .args(["-displayfd", "1", "-screen", "0", "1400x800x24", "-nolisten", "tcp"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .ok()?;
-    let mut number = String::new();
-    BufReader::new(child.stdout.take().expect("piped")).read_line(&mut number).expect("its number");
-    Some((Ended(child), format!(":{}", number.trim())))
-}
 
 /// Somebody before the window.
 struct Sailor {

@@ -10,7 +10,7 @@ mod write;
 
 pub use date::Date;
 pub use error::CalibrationError;
-pub use parse::parse;
+pub use parse::{POLYGONS_MOST, parse};
 pub use write::to_toml;
 
 use std::path::Path;

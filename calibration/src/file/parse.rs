@@ -156,8 +156,9 @@ fn ns_from_ms(ms: f64) -> i64 {
 const NORM_TOLERANCE: f64 = 1e-3;
 const NORM_EXACT: f64 = 1e-14;
 
-/// Polygons of the own ship, corners of one, and the share of the picture that they may hide.
-const POLYGONS_MOST: usize = 32;
+/// Polygons of the own gun and ship that a file may have.
+pub const POLYGONS_MOST: usize = 32;
+/// Corners of one of them, and the share of the picture that all may hide.
 const CORNERS_MOST: usize = 64;
 const SHARE_MOST: f64 = 0.8;
 

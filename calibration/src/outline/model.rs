@@ -3,7 +3,7 @@
 //! The model is only needed here. Parts of the gun keep their place in the picture, so that the trainer draws by the outline alone.
 
 use bowwave_core::{geometry::Lens, own_ship::Phantom};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::{
     CORNERS_MOST, FoundOutlines, ROUNDED, area, contour::closed_contours, contour::simplified, cover::cover,
@@ -23,7 +23,8 @@ pub fn outlines_of(
 ) -> FoundOutlines {
     let mut found = FoundOutlines::default();
     let Some(cover) = cover(lens, triangles) else { return found };
-    let picture = f64::from(lens.width) * f64::from(lens.height);
+    let size = DVec2::new(f64::from(lens.width), f64::from(lens.height));
+    let picture = size.element_product();
     let mut contours: Vec<_> = closed_contours(&cover.free, cover.size, 0.5)
         .into_iter()
         .map(|contour| contour.into_iter().map(|p| cover.low + p / cover.scale).collect::<Vec<_>>())
@@ -36,13 +37,64 @@ pub fn outlines_of(
             found.openings.push(-area / picture);
             continue;
         }
-        let corners = simplified(&contour, DETAIL_PX, CORNERS_MOST);
-        let outline = corners.into_iter().map(|p| (p * ROUNDED).round() / ROUNDED).collect();
+        let corners = sharpened(&contour, &simplified(&contour, DETAIL_PX, CORNERS_MOST), 1.0 / cover.scale);
+        let outline = corners.into_iter().map(|p| (p.clamp(DVec2::ZERO, size) * ROUNDED).round() / ROUNDED);
+        let outline = outline.collect();
         let number = found.phantoms.len() + 1;
         let name = if number == 1 { name.to_owned() } else { format!("{name} {number}").trim().to_owned() };
         found.phantoms.push(Phantom::new(name, outline, (lens.width, lens.height)));
     }
     found
+}
+
+/// Corners where the lines meet that the contour follows between them: a grid of cells cuts a corner off by some of a cell, and chords lie within
+/// what is round. `cell` is a cell's side, pixels.
+fn sharpened(contour: &[DVec2], corners: &[DVec2], cell: f64) -> Vec<DVec2> {
+    /// So far from a side's ends the cells know of the next side.
+    const ENDS: f64 = 1.5;
+    /// Fewest places of a line, and how far a corner may move, cells.
+    const PLACES_LEAST: usize = 4;
+    const MOVED_MOST: f64 = 1.5;
+    /// Lines that meet at less than this do not tell where, sine.
+    const MEET_LEAST: f64 = 0.02;
+    let (count, all) = (corners.len(), contour.len());
+    // Corners are places of the contour, in its order.
+    let Some(begin) = corners.first().and_then(|c| contour.iter().position(|p| p == c)) else {
+        return corners.to_vec();
+    };
+    let mut at = begin;
+    let mut lines = Vec::with_capacity(count);
+    for (i, from) in corners.iter().enumerate() {
+        let to = corners[(i + 1) % count];
+        let mut places = Vec::new();
+        for _ in 0..all {
+            at = (at + 1) % all;
+            if contour[at] == to {
+                break;
+            }
+            places.push(contour[at]);
+        }
+        places.retain(|p| p.distance(*from).min(p.distance(to)) > ENDS * cell);
+        lines.push((places.len() >= PLACES_LEAST).then(|| fitted(&places)));
+    }
+    let meet = |i: usize| {
+        let ((a, along), (b, other)) = (lines[(i + count - 1) % count]?, lines[i]?);
+        let sine = along.perp_dot(other);
+        let place = a + along * ((b - a).perp_dot(other) / sine);
+        (sine.abs() > MEET_LEAST && place.distance(corners[i]) < MOVED_MOST * cell).then_some(place)
+    };
+    (0..count).map(|i| meet(i).unwrap_or(corners[i])).collect()
+}
+
+/// The line of least squares through places: a place on it and its direction.
+fn fitted(places: &[DVec2]) -> (DVec2, DVec2) {
+    let middle = places.iter().sum::<DVec2>() / places.len() as f64;
+    let (mut across, mut both) = (0.0, 0.0);
+    for off in places.iter().map(|p| *p - middle) {
+        across += off.x * off.x - off.y * off.y;
+        both += 2.0 * off.x * off.y;
+    }
+    (middle, DVec2::from_angle(0.5 * both.atan2(across)))
 }
 
 #[cfg(test)]

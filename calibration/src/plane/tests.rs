@@ -66,13 +66,14 @@ fn error_share(lens: &Lens, frame: &PlaneFrame, places: &[[f64; 2]], random: &mu
 fn planes_that_are_taken_are_as_exact_as_the_bound_says() {
     let (lens, mut random) = (lens(), Random::new(5));
     let mut taken = 0;
-    for places in [
-        &SQUARE[..],
-        &[[-0.2, -0.15], [0.2, -0.15], [0.0, 0.15], [0.0, 0.0]],
-        &[[-0.03, -0.2], [0.03, -0.2], [0.03, 0.2], [-0.03, 0.2]],
-    ] {
+    let five = [SQUARE[0], SQUARE[1], SQUARE[2], SQUARE[3], [0.03, 0.04]];
+    let triangle = [[-0.2, -0.15], [0.2, -0.15], [0.0, 0.15], [0.0, 0.0]];
+    let tall = [[-0.03, -0.2], [0.03, -0.2], [0.03, 0.2], [-0.03, 0.2]];
+    for (places, above) in
+        [(&SQUARE[..], 0.1), (&triangle, 0.1), (&tall, 0.1), (&SQUARE, 0.0), (&five, 0.0), (&tall, 0.0)]
+    {
         for tilt in [0.0, 30.0, 60.0, 70.0, 75.0, 80.0, 84.0, 86.0, 88.0, 89.0, 89.9] {
-            let frame = tilted(tilt);
+            let frame = PlaneFrame { origin: DVec3::new(0.05, above, 1.0), ..tilted(tilt) };
             match PlaneView::new(&lens, &points(&lens, &frame, places)) {
                 Ok(view) => {
                     taken += 1;

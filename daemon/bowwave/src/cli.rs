@@ -3,6 +3,7 @@
 mod calibrate;
 mod desk;
 mod mounting;
+mod phantom;
 mod scenario;
 
 use std::{ffi::OsString, path::PathBuf};
@@ -15,9 +16,10 @@ use hw_sim::fault::{Fault, FaultKind};
 pub use calibrate::{Calibrate, CalibrateBoard, CalibrateIntrinsics, CalibrateTask};
 pub use desk::{DeskArgs, Play};
 pub use mounting::{
-    CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibratePhantom, CalibrateRestore,
-    CalibrateTrigger, CalibrateWizard, CalibrationFiles, InputArgs, OutputArgs, TracedOutline, WizardTask,
+    CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibrateRestore, CalibrateTrigger,
+    CalibrateWizard, CalibrationFiles, InputArgs, OutputArgs, WizardTask,
 };
+pub use phantom::{CalibratePhantom, TracedOutline};
 pub use scenario::{
     ScenarioArgs, ScenarioCheck, ScenarioCommand, ScenarioList, ScenarioNew, ScenarioPreview,
 };

@@ -36,8 +36,9 @@ pub(crate) fn homography(pairs: &[(DVec2, DVec2)]) -> Option<Matrix3<f64>> {
     conditioned(pairs).map(|(h, _)| h)
 }
 
-/// The same with the condition number of its equations: the ratio of the largest of their singular values to the least but one, the least
-/// being that of the homography itself.
+/// The same with the larger of two condition numbers, both between even points. That of its equations is the ratio of the largest of their
+/// singular values to the least but one, the least being that of the homography itself: it is large where the points do not tell one. That of
+/// the homography is large where it hardly leads back: a plane that is seen edge-on.
 pub(crate) fn conditioned(pairs: &[(DVec2, DVec2)]) -> Option<(Matrix3<f64>, f64)> {
     if pairs.len() < 4 {
         return None;
@@ -63,7 +64,9 @@ pub(crate) fn conditioned(pairs: &[(DVec2, DVec2)]) -> Option<(Matrix3<f64>, f64
     let h = t(seen, seen_scale).try_inverse()? * middle * t(board, board_scale);
     let mut squares = eigen.eigenvalues.as_slice().to_vec();
     squares.sort_by(f64::total_cmp);
-    let condition = (squares[8] / squares[1].max(0.0)).sqrt();
+    let equations = (squares[8] / squares[1].max(0.0)).sqrt();
+    let sizes = middle.singular_values();
+    let condition = equations.max(sizes.max() / sizes.min());
     h.iter().all(|v| v.is_finite()).then_some((h, condition))
 }
 

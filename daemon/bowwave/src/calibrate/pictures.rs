@@ -67,6 +67,17 @@ pub fn look(source: &Path, target: &Target) -> Result<BoardPictures> {
     Ok(looked)
 }
 
+/// Reads a picture as it lies in the file: that is how the trainer gets it from the camera.
+pub fn read_picture(path: &Path) -> Result<GrayImage> {
+    let bytes = picture_bytes(path)?;
+    let mut reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format()?;
+    let mut limits = Limits::default();
+    let side = u32::try_from(Grey::SIDE_MAX).unwrap_or(u32::MAX);
+    (limits.max_image_width, limits.max_image_height) = (Some(side), Some(side));
+    reader.limits(limits);
+    Ok(reader.decode()?.into_luma8())
+}
+
 fn folder(source: &Path, target: &Target, looked: &mut BoardPictures) -> Result<()> {
     let names = picture_names(source)?;
     if names.is_empty() {
@@ -76,14 +87,7 @@ fn folder(source: &Path, target: &Target, looked: &mut BoardPictures) -> Result<
     for path in names {
         bar.inc(1);
         let said = || format!("cannot read the picture {}; take it out of the folder", path.display());
-        let bytes = picture_bytes(&path).with_context(said)?;
-        let mut reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format().with_context(said)?;
-        let mut limits = Limits::default();
-        let side = u32::try_from(Grey::SIDE_MAX).unwrap_or(u32::MAX);
-        (limits.max_image_width, limits.max_image_height) = (Some(side), Some(side));
-        reader.limits(limits);
-        // As it lies in the file: that is how the trainer gets it from the camera.
-        let picture = reader.decode().with_context(said)?.into_luma8();
+        let picture = read_picture(&path).with_context(said)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         looked.take(name, &picture, target)?;
     }

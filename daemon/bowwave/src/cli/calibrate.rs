@@ -6,9 +6,12 @@ use bowwave_calibration::target::{Target, TargetError};
 use bowwave_core::text::{one_line, toml::TEXT_BYTES_MAX};
 use clap::{Args, Subcommand};
 
-use super::mounting::{
-    CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibratePhantom, CalibrateRestore,
-    CalibrateTrigger, CalibrateWizard,
+use super::{
+    mounting::{
+        CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibrateRestore, CalibrateTrigger,
+        CalibrateWizard,
+    },
+    phantom::CalibratePhantom,
 };
 
 /// Arguments of `calibrate`.

@@ -118,37 +118,6 @@ pub struct CalibrateBoresight {
     pub output: OutputArgs,
 }
 
-/// Arguments of `calibrate phantom`.
-#[derive(Debug, Args)]
-pub struct CalibratePhantom {
-    /// Recording (MCAP) in which the gun turns and tilts at the sea without firing, so that sea passes behind all of it
-    pub recording: PathBuf,
-    /// Trace a part by hand instead: its corners in pixels in order, once for each part; parts that touch must overlap
-    #[arg(long, value_name = "[NAME=]X,Y X,Y X,Y...", value_parser = parse_outline)]
-    pub outline: Vec<TracedOutline>,
-    /// The parts slide back along the bore with each round, as a machine gun's barrel does; for one part of several write
-    /// `recoils` in the file
-    #[arg(long)]
-    pub recoils: bool,
-    /// Also write the recording's mean picture with the outlines on it (PNG)
-    #[arg(long, value_name = "FILE")]
-    pub picture: Option<PathBuf>,
-    #[command(flatten)]
-    pub files: CalibrationFiles,
-    /// Print the result as JSON
-    #[arg(long)]
-    pub json: bool,
-}
-
-/// A part of the gun that was traced by hand.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TracedOutline {
-    /// Its name; may be empty.
-    pub name: String,
-    /// Its corners, pixels.
-    pub corners: Vec<DVec2>,
-}
-
 /// Task of the wizard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum WizardTask {
@@ -218,27 +187,12 @@ impl CalibrateWizard {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelMark(pub DVec2);
 
-fn parse_mark(text: &str) -> Result<PixelMark, String> {
+pub(super) fn parse_mark(text: &str) -> Result<PixelMark, String> {
     let numbers =
         text.split_once(',').and_then(|(x, y)| Some((x.trim().parse().ok()?, y.trim().parse().ok()?)));
     let mark = numbers.filter(|(x, y)| (0.0..=8192.0).contains(x) && (0.0..=8192.0).contains(y));
     mark.map(|(x, y)| PixelMark(DVec2::new(x, y)))
         .ok_or_else(|| format!("'{text}' is no place: write X,Y in pixels, as 641.5,358"))
-}
-
-fn parse_outline(text: &str) -> Result<TracedOutline, String> {
-    let (name, corners) = text.split_once('=').unwrap_or(("", text));
-    let corners: Vec<_> = corners.split_whitespace().map(parse_mark).collect::<Result<_, _>>()?;
-    if corners.len() < 3 {
-        return Err(format!(
-            "'{text}' has {} corners: an outline has three or more, as 'barrel=600,560 680,560 760,720'",
-            corners.len()
-        ));
-    }
-    Ok(TracedOutline {
-        name: name.trim().to_owned(),
-        corners: corners.into_iter().map(|mark| mark.0).collect(),
-    })
 }
 
 fn parse_range(text: &str) -> Result<f64, String> {

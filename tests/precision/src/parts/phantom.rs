@@ -1,4 +1,6 @@
-//! The gun's own outline in the camera's picture, and its recoil.
+//! The gun's own outline in the camera's picture, by pictures, models and planes, and its recoil.
+
+mod made;
 
 use anyhow::{Context, Result};
 use bowwave_calibration::outline::OutlineFinder;
@@ -21,9 +23,12 @@ use crate::bench::{ExtremeResult, PartBench};
 /// Description of this part.
 pub const ABOUT: About = About {
     part: "phantom",
-    what: "Finds what the camera sees of the gun, so that it hides the boats behind it, and follows its recoil.",
-    truth: "the outline that the simulated camera draws its barrel and front sight by, and its recoil at the frame's exposure",
-    rivals: "where the mean of all pictures is half as dark as the barrel; a recoil that is not followed",
+    what: "Finds what the camera sees of the gun, so that it hides the boats behind it, and follows its recoil. Outlines a model of it, and tells \
+           the place of what is traced on a plane.",
+    truth: "the outline that the simulated camera draws its barrel and front sight by, and its recoil at the frame's exposure; the hull of a \
+            solid's corners or circles in the undistorted view; a plane's own points, marked with an error of half a pixel",
+    rivals: "where the mean of all pictures is half as dark as the barrel; a recoil that is not followed; a model's corners joined by straight \
+             lines; the direct linear transform in pixels and metres",
     why: "how much of the sea's change a pixel shares says how much of it the gun covers, whatever the sea's colour. The settings are by \
           construction: a half is the edge. No recording chose them; those of this row only judge",
 };
@@ -191,6 +196,8 @@ fn recoil(simulated: &Simulated) -> Result<[f64; 3]> {
 
 /// Measures outlines and recoil.
 pub fn measure(bench: &mut PartBench) -> Result<()> {
+    made::models(bench);
+    made::planes(bench);
     let (cases, size): (&[Turned], _) = if bench.is_quick() {
         (&[Turned { scenario: "first-target", deg_s: 10.0 }], (640, 360))
     } else {

@@ -2,7 +2,7 @@
 //! and where nothing else is drawn over the video beneath it, the video pass takes it from there while it writes the pixels. That saves
 //! the frame two copies and a rendering. Otherwise it is drawn over the frame as everything else.
 
-mod glyphs;
+pub(crate) mod glyphs;
 pub(crate) mod layout;
 
 use ash::vk;

@@ -1,24 +1,27 @@
 //! `bowwave calibrate phantom`: what the camera sees of the gun itself, by its outlines.
 
+mod model;
+mod plane;
+mod source;
+mod trace;
+
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use bowwave_calibration::outline::{FoundOutlines, OutlineFinder};
-use bowwave_core::{
-    event::Event,
-    own_ship::{OwnShip, Phantom},
-};
+use bowwave_core::own_ship::{OwnShip, Phantom};
 use glam::DVec2;
 use image::{Rgb, RgbImage};
 use serde_json::json;
 
-use super::input::{open, write};
+use super::input::write;
 use crate::{
     cli::{CalibratePhantom, TracedOutline},
     outcome::Outcome,
     stdout,
     today::today,
 };
+use source::Seen;
 
 /// Half the width of an outline in the picture that shows it, pixels.
 const LINE_PX: f64 = 0.8;
@@ -26,29 +29,75 @@ const LINE: [u8; 3] = [255, 40, 40];
 
 /// Finds or takes the outlines, tells them and writes.
 pub fn run(arguments: &CalibratePhantom) -> Result<Outcome> {
-    let opened = open(&arguments.recording, arguments.files.calibration.as_deref())?;
-    let lens = &opened.file.calibration.lens;
+    let seen = Seen::open(arguments.recording.as_deref(), arguments.files.calibration.as_deref())?;
+    if arguments.plane.is_some() {
+        return plane::run(arguments, seen.file());
+    }
+    let lens = &seen.file().calibration.lens;
     let size = (lens.width, lens.height);
     let mut finder = OutlineFinder::new(size);
-    let is_traced = !arguments.outline.is_empty();
-    let is_cut = if is_traced && arguments.picture.is_none() {
-        false
-    } else {
-        opened.play(true, |event| {
-            if let Event::Frame(frame) = event {
-                finder.see(&frame.picture);
-            }
-        })?
-    };
-    let found = if is_traced {
+    let are_known = !arguments.outline.is_empty() || arguments.model.is_some();
+    let is_cut = if are_known && arguments.picture.is_none() { false } else { seen.show(&mut finder)? };
+    if arguments.trace {
+        return traced(arguments, seen, &finder, is_cut);
+    }
+    let (found, mut notes) = if let Some(path) = &arguments.model {
+        model::outlines(path, arguments, seen.file())?
+    } else if are_known {
         let part = |t: &TracedOutline| Phantom::new(t.name.as_str(), t.corners.clone(), size);
-        FoundOutlines { phantoms: arguments.outline.iter().map(part).collect(), ..FoundOutlines::default() }
+        let phantoms = arguments.outline.iter().map(part).collect();
+        (FoundOutlines { phantoms, ..FoundOutlines::default() }, Vec::new())
+    } else if let Seen::Recording(_) = seen {
+        (finder.find()?, Vec::new())
     } else {
-        finder.find()?
+        bail!(
+            "one picture does not tell what keeps still: trace the gun on it with --trace or --outline, or give a recording"
+        );
     };
+    notes.extend(notes_on(&found, arguments.model.is_some()));
+    let parts = found.phantoms.iter().map(|part| part.clone().recoiling(arguments.recoils));
+    let found = FoundOutlines { phantoms: parts.collect(), ..found };
+    ended(arguments, seen, &finder, Answer { found, notes, is_cut })
+}
+
+/// Lets somebody trace in a window.
+fn traced(arguments: &CalibratePhantom, seen: Seen, finder: &OutlineFinder, is_cut: bool) -> Result<Outcome> {
+    let lens = &seen.file().calibration.lens;
+    let size = (lens.width, lens.height);
+    let told = match &seen {
+        Seen::Recording(_) => finder.find().unwrap_or_else(|why| {
+            eprintln!("the recording itself tells no outline: {why}");
+            FoundOutlines::default()
+        }),
+        _ => FoundOutlines::default(),
+    };
+    let picture = seen.picture(finder);
+    let Some(phantoms) = trace::trace(&picture, size, &seen.file().phantoms, &told.phantoms)? else {
+        eprintln!("ended without saving; nothing is written");
+        return Ok(Outcome::Done);
+    };
+    let found = FoundOutlines { phantoms, ..FoundOutlines::default() };
+    ended(arguments, seen, finder, Answer { found, notes: Vec::new(), is_cut })
+}
+
+/// Outlines, and what there is to say about them.
+struct Answer {
+    found: FoundOutlines,
+    notes: Vec<String>,
+    is_cut: bool,
+}
+
+/// Tells the outlines, shows them and writes them. None at all are only written where somebody left all of them out.
+fn ended(
+    arguments: &CalibratePhantom,
+    seen: Seen,
+    finder: &OutlineFinder,
+    Answer { found, mut notes, is_cut }: Answer,
+) -> Result<Outcome> {
+    let lens = &seen.file().calibration.lens;
+    let size = (lens.width, lens.height);
     let share =
         OwnShip::new(found.phantoms.clone(), DVec2::ZERO, &[], size).mask.map_or(0.0, |mask| mask.share());
-    let mut notes = notes(&found);
     if is_cut {
         notes.push("the recording was cut short; what there is of it was used".to_owned());
     }
@@ -58,21 +107,20 @@ pub fn run(arguments: &CalibratePhantom) -> Result<Outcome> {
         stdout::print(text_of(&found, share, &notes))?;
     }
     if let Some(path) = &arguments.picture {
-        draw(path, &finder.mean(), size, &found.phantoms)?;
+        draw(path, &seen.picture(finder), size, &found.phantoms)?;
         eprintln!("{} shows them", path.display());
     }
-    if found.phantoms.is_empty() {
+    if found.phantoms.is_empty() && !arguments.trace {
         return Ok(Outcome::Failed);
     }
-    let mut file = opened.file;
-    let parts = found.phantoms.into_iter();
-    file.phantoms = parts.map(|part| part.recoiling(arguments.recoils)).collect();
+    let mut file = seen.into_file();
+    file.phantoms = found.phantoms;
     write(file, today()?, &arguments.files)?;
     Ok(Outcome::Done)
 }
 
 /// Notes on outlines that were not taken.
-fn notes(found: &FoundOutlines) -> Vec<String> {
+fn notes_on(found: &FoundOutlines, is_model: bool) -> Vec<String> {
     let percent = |shares: &[f64]| {
         let shares: Vec<_> = shares.iter().map(|s| format!("{:.1} %", s * 100.0)).collect();
         shares.join(", ")
@@ -85,14 +133,22 @@ fn notes(found: &FoundOutlines) -> Vec<String> {
         ));
     }
     if !found.openings.is_empty() {
+        let remedy = if is_model {
+            "cut the model's part through there into nodes of different names"
+        } else {
+            "trace the parts around one by hand, with --outline"
+        };
         notes.push(format!(
-            "the sea is seen through openings of {} of the picture, and nothing is drawn in them: trace the parts around one by hand, with \
-             --outline",
+            "the sea is seen through openings of {} of the picture, and nothing is drawn in them: {remedy}",
             percent(&found.openings)
         ));
     }
     if found.phantoms.is_empty() {
-        notes.push("nothing of the gun is in the picture, or it is smaller than 0.03 % of it".to_owned());
+        notes.push(if is_model {
+            "nothing of the model is in the picture: check --camera-at, the axes (x left, y up, z along the bore) and metres".to_owned()
+        } else {
+            "nothing of the gun is in the picture, or it is smaller than 0.03 % of it".to_owned()
+        });
     }
     notes
 }
