@@ -52,9 +52,11 @@ pub fn outlines_of(
 fn sharpened(contour: &[DVec2], corners: &[DVec2], cell: f64) -> Vec<DVec2> {
     /// So far from a side's ends the cells know of the next side.
     const ENDS: f64 = 1.5;
-    /// Fewest places of a line, and how far a corner may move, cells.
+    /// Fewest places of a line.
     const PLACES_LEAST: usize = 4;
+    /// How far the nearest corner may move, and how far from there the farthest of those may lie that are one, cells.
     const MOVED_MOST: f64 = 1.5;
+    const CUT_MOST: f64 = 4.0;
     /// Lines that meet at less than this do not tell where, sine.
     const MEET_LEAST: f64 = 0.02;
     let (count, all) = (corners.len(), contour.len());
@@ -77,13 +79,29 @@ fn sharpened(contour: &[DVec2], corners: &[DVec2], cell: f64) -> Vec<DVec2> {
         places.retain(|p| p.distance(*from).min(p.distance(to)) > ENDS * cell);
         lines.push((places.len() >= PLACES_LEAST).then(|| fitted(&places)));
     }
-    let meet = |i: usize| {
-        let ((a, along), (b, other)) = (lines[(i + count - 1) % count]?, lines[i]?);
-        let sine = along.perp_dot(other);
-        let place = a + along * ((b - a).perp_dot(other) / sine);
-        (sine.abs() > MEET_LEAST && place.distance(corners[i]) < MOVED_MOST * cell).then_some(place)
-    };
-    (0..count).map(|i| meet(i).unwrap_or(corners[i])).collect()
+    // From line to line: between two of them lies a corner, or what the grid made of it.
+    let Some(first) = lines.iter().position(Option::is_some) else { return corners.to_vec() };
+    let mut sharp = Vec::with_capacity(count);
+    let mut before = first;
+    while before < first + count {
+        let after =
+            (before + 1..=first + count).find(|i| lines[i % count].is_some()).unwrap_or(first + count);
+        let between = (before + 1..=after).map(|i| corners[i % count]);
+        let meet = lines[before % count].zip(lines[after % count]).and_then(|((a, along), (b, other))| {
+            let sine = along.perp_dot(other);
+            let place = a + along * ((b - a).perp_dot(other) / sine);
+            let off = between.clone().map(|corner| place.distance(corner) / cell);
+            let [nearest, farthest] = off.fold([f64::INFINITY, 0.0], |[n, f], off| [n.min(off), f.max(off)]);
+            let is_near = nearest < MOVED_MOST && farthest < CUT_MOST;
+            (sine.abs() > MEET_LEAST && is_near).then_some(place)
+        });
+        match meet {
+            Some(place) => sharp.push(place),
+            None => sharp.extend(between),
+        }
+        before = after;
+    }
+    sharp
 }
 
 /// The line of least squares through places: a place on it and its direction.
@@ -186,6 +204,10 @@ mod tests {
         };
         let off = rms(&found, (0..4).flat_map(side));
         assert!(off < 0.04, "{off} px rms");
+        for corner in corners.map(|corner| lens.project(corner).unwrap()) {
+            let nearest = found.phantoms[0].outline().iter().map(|p| p.distance(corner)).fold(9.0, f64::min);
+            assert!(nearest < 0.07, "{nearest} px from the corner at {corner}");
+        }
     }
 
     /// A tube's mantle and caps, along z, of so many facets.
