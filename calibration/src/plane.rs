@@ -115,8 +115,9 @@ impl PlaneView {
         let spread_px = spread(pairs.iter().map(|(_, seen)| *seen * lens.focal));
         let most = ERROR_MOST * spread_px / MARKED_PX;
         let (h, condition) = conditioned(&pairs).unwrap_or((Matrix3::zeros(), f64::INFINITY));
-        // Also where it is no number.
-        if !(condition <= most) {
+        // Not where it is no number.
+        let is_told = condition <= most;
+        if !is_told {
             if let Some(line) = line_of(points) {
                 return Err(PlaneError::Line(line));
             }
