@@ -74,7 +74,8 @@ impl Tracer<'_> {
                 }
                 Met::Sea(at) => {
                     gathered.parts[Component::Sea as usize] += carried * self.light.sea;
-                    gathered.parts[Component::HullInSea as usize] += carried * self.hull_in_sea(at, out, path);
+                    gathered.parts[Component::HullInSea as usize] +=
+                        carried * self.hull_in_sea(at, out, path);
                     break;
                 }
             };
