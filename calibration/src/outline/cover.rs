@@ -9,6 +9,8 @@ use glam::{DVec2, DVec3};
 
 /// Nearer to the camera's plane than this nothing is drawn, metres.
 const NEAR_M: f64 = 1e-3;
+/// Nearer to the axis behind the camera than this nothing is drawn, metres.
+const FAR_END_M: f64 = 1e-7;
 /// Chords leave the bent side of a triangle by no more than this, pixels.
 const CHORD_PX: f64 = 0.01;
 /// Arcs longer than this are halved in any case, radians: the middle of a longer one does not tell how it bends.
@@ -73,7 +75,7 @@ impl<'a> Polygons<'a> {
     }
 
     /// Adds what is before the camera's plane; of a fisheye, which may see behind it, also the rest by quarters: an arc around the axis's far
-    /// end has no inside.
+    /// end has no inside. That end itself lies on no side of the picture, and is left out.
     fn add(&mut self, triangle: [DVec3; 3]) {
         if self.lens.optics().bend != Bend::Fisheye {
             return self.piece(clipped(&triangle, DVec3::Z, NEAR_M));
@@ -82,7 +84,8 @@ impl<'a> Polygons<'a> {
         let behind = clipped(&triangle, DVec3::NEG_Z, 0.0);
         if !behind.is_empty() {
             for (x, y) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
-                self.piece(clipped(&clipped(&behind, DVec3::X * x, 0.0), DVec3::Y * y, 0.0));
+                let quarter = clipped(&clipped(&behind, DVec3::X * x, 0.0), DVec3::Y * y, 0.0);
+                self.piece(clipped(&quarter, DVec3::new(x, y, 0.0), FAR_END_M));
             }
         }
     }
