@@ -165,7 +165,7 @@ pub fn measure(bench: &mut PartBench) -> Result<()> {
             };
             let way = Way::new(method, &setting, error, places.len(), work);
             if i == 0 {
-                way.default_although("a lower lamp errs less: found by this part, and not changed yet")
+                way.default_although("a lower lamp errs less here; tried in a boat that burns inside, it stood below the deck and left it dark")
             } else {
                 way
             }
