@@ -4,7 +4,7 @@
 //! deviation over all pictures is half of that of the sea a few pixels further out. A sky keeps still as well where the horizon never comes; its
 //! end is no edge in most pictures, and so it is told from the gun.
 //!
-//! Where there is a model of the gun, [`outlines_of`] says how it is seen.
+//! [`outlines_of`] takes the outlines from a model of the gun.
 
 use bowwave_core::{event::Picture, own_ship::Phantom};
 use glam::DVec2;

@@ -36,7 +36,7 @@ pub struct SeenPoint {
     pub plane: DVec2,
 }
 
-/// Why points do not tell how a plane is seen.
+/// Points that do not tell how a plane is seen.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlaneError {
     /// Fewer than four, or too many.
@@ -73,7 +73,7 @@ pub enum PlaneError {
         most: f64,
         /// Mean distance of the points from their middle, pixels.
         spread_px: f64,
-        /// What an error of [`MARKED_PX`] makes of places on the plane, millimetres.
+        /// Error of places on the plane by one of [`MARKED_PX`], millimetres.
         off_mm: f64,
     },
     /// A place of the picture shows nothing of the plane.
@@ -81,7 +81,7 @@ pub enum PlaneError {
     Horizon(usize),
 }
 
-/// How a plane is seen.
+/// A plane as the camera sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaneView {
     lens: Lens,
@@ -115,7 +115,7 @@ impl PlaneView {
         let spread_px = spread(pairs.iter().map(|(_, seen)| *seen * lens.focal));
         let most = ERROR_MOST * spread_px / MARKED_PX;
         let (h, condition) = conditioned(&pairs).unwrap_or((Matrix3::zeros(), f64::INFINITY));
-        // Not where it is no number.
+        // A NaN is refused as well.
         let is_told = condition <= most;
         if !is_told {
             if let Some(line) = line_of(points) {

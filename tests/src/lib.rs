@@ -3,10 +3,11 @@
 #![forbid(unsafe_code)]
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
+pub mod desktop;
+
 use std::{
-    io::{BufRead as _, BufReader},
     path::{Path, PathBuf},
-    process::{Child, Command, Output, Stdio},
+    process::{Command, Output},
     sync::OnceLock,
 };
 
@@ -95,30 +96,6 @@ pub fn write(folder: &Path, name: &str, text: &str) -> String {
     let path = folder.join(name);
     std::fs::write(&path, text).expect("a file");
     path.to_str().expect("a plain path").to_owned()
-}
-
-/// A process that ends with its owner.
-pub struct Ended(pub Child);
-
-impl Drop for Ended {
-    fn drop(&mut self) {
-        if self.0.kill().is_ok() {
-            let _ = self.0.wait();
-        }
-    }
-}
-
-/// A virtual desktop and its name; `None` where Xvfb is not installed.
-pub fn desktop() -> Option<(Ended, String)> {
-    let mut child = Command::new("Xvfb")
-        .args(["-displayfd", "1", "-screen", "0", "1400x900x24", "-nolisten", "tcp"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .ok()?;
-    let mut number = String::new();
-    BufReader::new(child.stdout.take().expect("piped")).read_line(&mut number).expect("its number");
-    Some((Ended(child), format!(":{}", number.trim())))
 }
 
 /// Standard error of a run.

@@ -5,21 +5,17 @@
 
 use std::{
     env, fs,
-    process::{Child, Command},
+    process::Command,
     thread,
     time::{Duration, Instant},
 };
 
-use bowwave_tests::{Ended, bowwave, desktop, expect_code, root};
-use serde_json::Value;
-use x11rb::{
-    connection::Connection,
-    protocol::{
-        xproto::{AtomEnum, ConnectionExt as _, ImageFormat, Window},
-        xtest::ConnectionExt as _,
-    },
-    rust_connection::RustConnection,
+use bowwave_tests::{
+    bowwave,
+    desktop::{BUTTON_PRESS, BUTTON_RELEASE, Ended, MOTION, Sitter, desktop},
+    expect_code, root,
 };
+use serde_json::Value;
 
 /// Size of the window.
 const SIZE: (u16, u16) = (1280, 720);
@@ -27,59 +23,16 @@ const SIZE: (u16, u16) = (1280, 720);
 const PATIENCE: Duration = Duration::from_secs(1200);
 /// A boat must be hit so long after the window is there.
 const LIMIT_S: f64 = 30.0;
-/// Events of XTEST.
-const BUTTON_PRESS: u8 = 4;
-const BUTTON_RELEASE: u8 = 5;
-const MOTION: u8 = 6;
-
-/// Somebody before the window.
-struct Sailor {
-    connection: RustConnection,
-    root: Window,
-    window: Window,
+fn fire(sailor: &Sitter) {
+    sailor.send(BUTTON_PRESS, 1, (0, 0));
+    thread::sleep(Duration::from_millis(250));
+    sailor.send(BUTTON_RELEASE, 1, (0, 0));
 }
 
-impl Sailor {
-    /// Waits for the window: on a busy computer it is there before it can be seen.
-    fn before(display: &str, game: &mut Child) -> Self {
-        let (connection, screen) = x11rb::connect(Some(display)).expect("the desktop answers");
-        let root = connection.setup().roots[screen].root;
-        let begun = Instant::now();
-        loop {
-            assert!(begun.elapsed() < PATIENCE, "no window after {PATIENCE:?}");
-            assert!(game.try_wait().expect("it can be asked").is_none(), "the demo ended without a window");
-            let children = connection.query_tree(root).expect("sent").reply().expect("a tree").children;
-            let named = children.into_iter().find(|window| {
-                let asked = connection.get_property(false, *window, AtomEnum::WM_NAME, AtomEnum::ANY, 0, 64);
-                asked.ok().and_then(|c| c.reply().ok()).is_some_and(|name| name.value.starts_with(b"Bowwave"))
-            });
-            if let Some(window) = named.filter(|window| look(&connection, *window).is_some()) {
-                return Self { connection, root, window };
-            }
-            thread::sleep(Duration::from_millis(50));
-        }
-    }
-
-    fn mouse(&self, kind: u8, detail: u8, to: (i16, i16)) {
-        let sent = self.connection.xtest_fake_input(kind, detail, 0, self.root, to.0, to.1, 0);
-        drop(sent.expect("sent"));
-        self.connection.flush().expect("sent");
-    }
-
-    fn fire(&self) {
-        self.mouse(BUTTON_PRESS, 1, (0, 0));
-        thread::sleep(Duration::from_millis(250));
-        self.mouse(BUTTON_RELEASE, 1, (0, 0));
-    }
-}
-
-/// Brightness of a window's pixels, where it can be seen.
-fn look(connection: &RustConnection, window: Window) -> Option<Vec<i32>> {
-    let (width, height) = SIZE;
-    let asked = connection.get_image(ImageFormat::Z_PIXMAP, window, 0, 0, width, height, !0);
-    let image = asked.ok()?.reply().ok()?;
-    // Blue, green, red and nothing.
-    let pixels = image.data.chunks_exact(4);
+/// Brightness of the window's pixels, where it can be seen.
+fn look(sailor: &Sitter) -> Option<Vec<i32>> {
+    let data = sailor.pixels(SIZE)?;
+    let pixels = data.chunks_exact(4);
     Some(pixels.map(|p| i32::from(p[0]) + 2 * i32::from(p[1]) + i32::from(p[2])).collect())
 }
 
@@ -141,22 +94,22 @@ fn a_boat_is_hit_within_half_a_minute_by_aiming_with_the_mouse() {
             .spawn()
             .expect("./demo runs"),
     );
-    let sailor = Sailor::before(&display, &mut game.0);
-    sailor.mouse(MOTION, 0, (700, 400));
+    let sailor = Sitter::before(&display, &mut game.0, PATIENCE);
+    sailor.send(MOTION, 0, (700, 400));
     let begun = Instant::now();
     let mut last_fire = begun;
     while begun.elapsed().as_secs_f64() < LIMIT_S {
         thread::sleep(Duration::from_millis(70));
-        let Some(light) = look(&sailor.connection, sailor.window) else { break };
+        let Some(light) = look(&sailor) else { break };
         let Some((x, y)) = boat(&light) else { continue };
         // A round falls by half a metre on its way: the barrel points two pixels above the boat.
         let off = (x - 640.0, y - 362.0);
         let step = |off: f64| (0.16 * off).clamp(-40.0, 40.0).round() as i16;
-        sailor.mouse(MOTION, 1, (step(off.0), step(off.1)));
+        sailor.send(MOTION, 1, (step(off.0), step(off.1)));
         let is_on = off.0.abs() < 6.0 && off.1.abs() < 2.5;
         if is_on && begun.elapsed().as_secs_f64() > 4.0 && last_fire.elapsed().as_secs_f64() > 0.8 {
             last_fire = Instant::now();
-            sailor.fire();
+            fire(&sailor);
         }
     }
     assert!(game.0.wait().expect("it ends").success(), "the demo fails");

@@ -177,21 +177,16 @@ fn what_is_traced_on_a_plane_comes_back_as_a_model() {
     let outline = format!("shield={}", text.join(" "));
     let glb = bench.path("shield.glb");
     let glb = glb.to_str().unwrap();
-    let output = bench.phantom(&[
-        "--camera-at",
-        CAMERA_AT,
-        "--plane",
-        &plane,
-        "--outline",
-        &outline,
-        "--glb",
-        glb,
-        "--json",
-    ]);
-    expect_code(&output, 0);
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-    println!("{told}");
-    assert!(told["parts"][0]["off_px"].as_f64().unwrap() < 0.05, "{told}");
+    let trace = |axes: &[&str]| {
+        let common =
+            ["--camera-at", CAMERA_AT, "--plane", &plane, "--outline", &outline, "--glb", glb, "--json"];
+        let output = bench.phantom(&[&common, axes].concat());
+        expect_code(&output, 0);
+        let told: Value = serde_json::from_slice(&output.stdout).unwrap();
+        println!("{told}");
+        assert!(told["parts"][0]["off_px"].as_f64().unwrap() < 0.05, "{told}");
+    };
+    trace(&[]);
     // The calibration stays as it is.
     assert_eq!(bench.outlines("cal.toml"), []);
     let out = bench.path("new.toml");
@@ -205,22 +200,7 @@ fn what_is_traced_on_a_plane_comes_back_as_a_model() {
     assert!(off.iter().all(|off| *off < 0.1), "{off:?}");
     // The same by the plane's axes as they were measured.
     let axes = "0,0.1,0.4 -1,0,0 0,0.8,0.6";
-    let output = bench.phantom(&[
-        "--camera-at",
-        CAMERA_AT,
-        "--plane",
-        &plane,
-        "--plane-axes",
-        axes,
-        "--outline",
-        &outline,
-        "--glb",
-        glb,
-        "--json",
-    ]);
-    expect_code(&output, 0);
-    let told: Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(told["parts"][0]["off_px"].as_f64().unwrap() < 0.05, "{told}");
+    trace(&["--plane-axes", axes]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The share of each cell of a fine grid that triangles cover, as a lens shows them.
 //!
-//! What a triangle covers depends only on the directions of its corners. Its sides are arcs between them, which a lens bends. So each side is
+//! The cover of a triangle depends only on the directions of its corners. Its sides are arcs between them, which a lens bends. So each side is
 //! followed until its chords are straight enough, and the polygon of all of them is filled along scan lines: exactly across, by several lines
 //! down a cell.
 
@@ -39,7 +39,7 @@ pub(super) struct Cover {
     pub free: Vec<f32>,
 }
 
-/// What triangles of the camera's space cover; `None` where nothing of them is in the picture.
+/// Cover of triangles of the camera's space; `None` where nothing of them is in the picture.
 pub(super) fn cover(lens: &Lens, triangles: impl IntoIterator<Item = [DVec3; 3]>) -> Option<Cover> {
     let whole = DVec2::new(f64::from(lens.width), f64::from(lens.height));
     let mut polygons = Polygons::new(lens);

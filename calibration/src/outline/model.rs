@@ -54,7 +54,7 @@ fn sharpened(contour: &[DVec2], corners: &[DVec2], cell: f64) -> Vec<DVec2> {
     const ENDS: f64 = 1.5;
     /// Fewest places of a line.
     const PLACES_LEAST: usize = 4;
-    /// How far the nearest corner may move, and how far from there the farthest of those may lie that are one, cells.
+    /// Most that the nearest corner may move, and distance from there within which corners are one, cells.
     const MOVED_MOST: f64 = 1.5;
     const CUT_MOST: f64 = 4.0;
     /// Lines that meet at less than this do not tell where, sine.
@@ -146,7 +146,7 @@ mod tests {
                 .collect()
         }
 
-        /// Whether a ray from the camera meets it (Kay and Kajiya 1986), farther than the near plane.
+        /// Tests whether a ray from the camera meets it (Kay and Kajiya 1986), farther than the near plane.
         fn is_met(&self, ray: DVec3) -> bool {
             let (from, along) = (self.turn.inverse() * -self.middle, self.turn.inverse() * ray);
             let (a, b) = ((-self.half - from) / along, (self.half - from) / along);

@@ -188,17 +188,18 @@ fn guards_lead_from_state_to_state() {
     assert!(place(&fleet, 0, 40.0).speed_m_s.abs() < 1.0, "it lies still");
 }
 
+/// A crew that creeps about until it is lit.
+fn runs_when_lit() -> Arc<CrewPlan> {
+    let lit = exit(Guard { lit: true, ..Guard::default() }, 1);
+    plan(vec![
+        state("creep", Act::Loiter { radius_m: 40.0 }, 4.0, vec![lit]),
+        state("run", Act::Flee, 25.0, vec![]),
+    ])
+}
+
 #[test]
 fn a_crew_notices_a_beam_that_is_on_it_at_any_pace_of_frames() {
-    let crew = plan(vec![
-        state(
-            "creep",
-            Act::Loiter { radius_m: 40.0 },
-            4.0,
-            vec![exit(Guard { lit: true, ..Guard::default() }, 1)],
-        ),
-        state("run", Act::Flee, 25.0, vec![]),
-    ]);
+    let crew = runs_when_lit();
     let spec = SearchlightSpec { candela: 200_000.0, beam: 0.14, is_on: true };
     let night = Daylight::fixed(DVec3::NEG_Z, 2e4);
     let seen = |frames_a_second: u32, axis_deg: f64| {
@@ -224,15 +225,7 @@ fn a_crew_notices_a_beam_that_is_on_it_at_any_pace_of_frames() {
 
 #[test]
 fn a_crew_that_a_flare_lights_goes_on_at_any_pace_of_frames() {
-    let crew = plan(vec![
-        state(
-            "creep",
-            Act::Loiter { radius_m: 40.0 },
-            4.0,
-            vec![exit(Guard { lit: true, ..Guard::default() }, 1)],
-        ),
-        state("run", Act::Flee, 25.0, vec![]),
-    ]);
+    let crew = runs_when_lit();
     let run = |frames_a_second: u32| {
         let night = SceneLight::new(&Daylight::fixed(DVec3::NEG_Z, 2e4), 5.0).at(start());
         let mut fleet =

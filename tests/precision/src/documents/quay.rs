@@ -2,9 +2,9 @@
 
 use bowwave_core::{
     geometry::{CameraPose, Lens, RigidPose, look},
-    model::{Model, ModelKind, Vertex},
+    model::Model,
 };
-use glam::{DQuat, DVec2, DVec3, Vec2, Vec3};
+use glam::{DQuat, DVec2, DVec3, Vec3};
 use hw_sim::ocean::mesh::BoatMesh;
 use image::{Rgb, RgbImage};
 use rayon::prelude::*;
@@ -16,7 +16,7 @@ use crate::{
         seen::{SeenPoint, SeenPoints},
     },
     truth::{
-        boat::{box_boat, mesh},
+        boat::{block, box_boat, mesh},
         files::code,
     },
 };
@@ -57,39 +57,10 @@ pub struct Quay {
     lens: Lens,
 }
 
-/// A box with its bottom at height 0.
+/// A crate of that length, width and height, its bottom at height 0.
 fn crate_model([length, beam, height]: [f32; 3], albedo: Vec3) -> Model {
-    let (min, max) =
-        (Vec3::new(-length / 2.0, -beam / 2.0, 0.0), Vec3::new(length / 2.0, beam / 2.0, height));
-    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
-    for axis in 0..3 {
-        for sign in [-1.0_f32, 1.0] {
-            let mut normal = Vec3::ZERO;
-            normal[axis] = sign;
-            let (u, v) =
-                if sign > 0.0 { ((axis + 1) % 3, (axis + 2) % 3) } else { ((axis + 2) % 3, (axis + 1) % 3) };
-            let first = vertices.len() as u32;
-            for (a, b) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
-                let mut position = Vec3::ZERO;
-                position[axis] = if sign > 0.0 { max[axis] } else { min[axis] };
-                position[u] = min[u] + a * (max[u] - min[u]);
-                position[v] = min[v] + b * (max[v] - min[v]);
-                vertices.push(Vertex { position, normal, uv: Vec2::ZERO, albedo });
-            }
-            indices.extend([0, 1, 2, 0, 2, 3].map(|i| first + i));
-        }
-    }
-    Model {
-        name: "crate".to_owned(),
-        kind: ModelKind::Mesh,
-        vertices,
-        indices,
-        parts: Vec::new(),
-        texture: None,
-        waterline: Vec::new(),
-        min,
-        max,
-    }
+    let half = Vec3::new(length / 2.0, beam / 2.0, 0.0);
+    block(-half, half.with_z(height), albedo)
 }
 
 impl Quay {

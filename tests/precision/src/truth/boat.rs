@@ -69,6 +69,13 @@ pub fn box_boat() -> Model {
     made.finish()
 }
 
+/// A box between two corners, for what is no boat: without parts and waterline.
+pub fn block(low: Vec3, high: Vec3, albedo: Vec3) -> Model {
+    let mut made = BoxMaker::default();
+    made.block(low, high, albedo);
+    Model { name: "block".to_owned(), parts: Vec::new(), waterline: Vec::new(), ..made.finish() }
+}
+
 #[derive(Default)]
 struct BoxMaker {
     vertices: Vec<Vertex>,

@@ -138,12 +138,12 @@ impl<'a> Corners<'a> {
 
 /// A corner as it is drawn on one of its sides.
 fn lit_corner(v: &Vertex, light: &CornerLight, side: usize) -> MeshVertex {
-    let [a, b, c, d, e, f, g, h, i, sea, thrown @ ..] = light.seen[side];
+    let [a, b, c, d, e, f, g, h, i, sea, thrown @ ..] = light[side];
     MeshVertex {
         position: v.position.to_array(),
         normal: (if side == 0 { v.normal } else { -v.normal }).to_array(),
         uv: v.uv.to_array(),
-        albedo: light.albedo.to_array(),
+        albedo: v.albedo.to_array(),
         sky0: [a, b, c, d],
         sky1: [e, f, g, h],
         sky2: [i, sea],

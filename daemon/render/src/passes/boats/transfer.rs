@@ -13,13 +13,10 @@ use std::{
     sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
-use bowwave_core::{
-    model::{Model, Vertex},
-    sky::LOBES,
-};
-use glam::{DVec3, Vec3};
+use bowwave_core::{model::Model, sky::LOBES};
+use glam::DVec3;
 
-use fit::{Sample, fit};
+use fit::{Sample, Seat, fit};
 use places::{Place, lit_places};
 
 /// Directions above the water and below it from which light comes. They spiral: no two are above each other.
@@ -32,7 +29,7 @@ pub(crate) const SUN: usize = LOBES + 1;
 /// Terms of the latter: 1 and the three coordinates of the unit vector towards the sun.
 const SUN_TERMS: usize = 4;
 
-/// What a matt white corner makes of the light that there is, from there and by way of the boat: its radiance over that of each of the sky's lobes,
+/// The light of a matt white corner, from outside and by way of the boat: its radiance over that of each of the sky's lobes,
 /// then over that of the sea. Then, over the radiance of white that faces the sun, of what the boat's other faces throw to it, as a sum of
 /// [`SUN_TERMS`]; the sun itself is not in it.
 pub(crate) type Transfer = [f32; SUN + SUN_TERMS];
@@ -40,14 +37,8 @@ pub(crate) type Transfer = [f32; SUN + SUN_TERMS];
 /// No light.
 const DARK: Transfer = [0.0; SUN + SUN_TERMS];
 
-/// What a corner is drawn with.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct CornerLight {
-    /// On the side of the normal, and on the other.
-    pub(crate) seen: [Transfer; 2],
-    /// Linear diffuse reflectance.
-    pub(crate) albedo: Vec3,
-}
+/// A corner's light on the side of its normal, and on the other.
+pub(crate) type CornerLight = [Transfer; 2];
 
 /// The light of a model: at its corners, and at places all over its surface.
 pub(crate) struct BakedLight {
@@ -94,20 +85,34 @@ fn directions(count: u32, sign: f64) -> impl Iterator<Item = DVec3> {
 impl BakedLight {
     fn of(model: &Model) -> Self {
         let places = lit_places(model);
-        let [front, back] = [0, 1].map(|side| {
+        let corners = by_sides(|side| {
             let mut held = vec![DARK; model.vertices.len()];
-            let seen = places.iter().filter(|place| !place.buried[side]);
-            let samples: Vec<_> =
-                seen.map(|place| Sample { at: place.at, weight: 1.0, value: place.light[side] }).collect();
-            let weights = fit(&samples, &mut held);
-            held.iter_mut().for_each(bound);
+            let weights = fit_side(places.iter().map(|place| (place.at, 1.0, place)), side, &mut held);
             fill_buried(model, weights.into_iter().map(|weight| weight > 0.0).collect(), &mut held);
             held
         });
-        let sides = front.into_iter().zip(back);
-        let corner = |(v, (front, back)): (&Vertex, _)| CornerLight { seen: [front, back], albedo: v.albedo };
-        Self { corners: model.vertices.iter().zip(sides).map(corner).collect(), places }
+        Self { corners, places }
     }
+}
+
+/// Each corner's light from that of all corners on either side.
+fn by_sides(light: impl FnMut(usize) -> Vec<Transfer>) -> Vec<CornerLight> {
+    let [front, back] = [0, 1].map(light);
+    front.into_iter().zip(back).map(|(front, back)| [front, back]).collect()
+}
+
+/// Fits what corners hold on a side to the places, with their seats and weights, that are not buried there. The weight about each corner.
+fn fit_side<'a>(
+    places: impl Iterator<Item = (Seat, f32, &'a Place)>,
+    side: usize,
+    held: &mut [Transfer],
+) -> Vec<f32> {
+    let seen = places.filter(|(_, _, place)| !place.buried[side]);
+    let samples: Vec<_> =
+        seen.map(|(at, weight, place)| Sample { at, weight, value: place.light[side] }).collect();
+    let weights = fit(&samples, held);
+    held.iter_mut().for_each(bound);
+    weights
 }
 
 /// No face gets less than no light, and none much more than all.
@@ -146,6 +151,7 @@ fn fill_buried(model: &Model, mut known: Vec<bool>, found: &mut [Transfer]) {
 #[cfg(test)]
 mod tests {
     use bowwave_core::sky::SkyLobes;
+    use glam::Vec3;
 
     use super::*;
     use crate::testing;
@@ -159,7 +165,7 @@ mod tests {
     fn a_box_sees_what_its_sides_face() {
         let model = testing::box_model("box", [4.0, 2.0, 1.5], [0.5; 3]);
         for (vertex, t) in model.vertices.iter().zip(&baked_light(&model).corners) {
-            let (sky, sea) = parts(&t.seen[0]);
+            let (sky, sea) = parts(&t[0]);
             let expected = match vertex.normal.z {
                 z if z > 0.9 => (1.0, 0.0),
                 z if z < -0.9 => (0.0, 1.0),
@@ -180,7 +186,7 @@ mod tests {
             model.vertices.iter_mut().for_each(|v| v.albedo = Vec3::ZERO);
             let found = BakedLight::of(&model).corners;
             let mut seen = 0.0;
-            for t in found.iter().flat_map(|corner| &corner.seen) {
+            for t in found.iter().flatten() {
                 let (sky, sea) = parts(t);
                 assert!(t.iter().all(|v| v.is_finite()) && sky >= 0.0 && sky + sea < 1.06, "{name}: {t:?}");
                 seen += sky + sea;
@@ -265,7 +271,7 @@ mod tests {
                     }
                 }
                 let held = |k: usize| {
-                    let t = &seen.corners[corners[k] as usize].seen[0];
+                    let t = &seen.corners[corners[k] as usize][0];
                     (0..LOBES).map(|i| f64::from(t[i] * lobes.terms[i].x)).sum::<f64>()
                         + f64::from(t[SEA]) * SEA_LIGHT
                 };

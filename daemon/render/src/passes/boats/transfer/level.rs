@@ -1,37 +1,26 @@
-//! The light of a simplified model: what its fewer corners have to hold so that its triangles are as bright as the surface that they stand for.
+//! The light of a simplified model: its fewer corners hold so much that its triangles are as bright as the surface that they stand for.
 
 use bowwave_core::model::Model;
 use glam::Vec3;
 
-use super::{
-    BakedLight, CornerLight, Transfer, bound,
-    fit::{Sample, Seat, fit},
-    places::Place,
-};
+use super::{BakedLight, CornerLight, by_sides, fit::Seat, fit_side, places::Place};
 
 /// Places that are looked at for each triangle of a level.
 const PLACES_A_TRIANGLE: usize = 12;
 
 impl BakedLight {
-    /// What the corners hold where `model` is drawn by `triangles` that lie within `error_m` of it: least squares of what its surface gets.
+    /// Light of the corners where `model` is drawn by `triangles` that lie within `error_m` of it: least squares of what its surface gets.
     /// Corners keep what they hold where none of the surface is nearest to their triangles.
     pub(crate) fn on_level(&self, model: &Model, triangles: &[[u32; 3]], error_m: f32) -> Vec<CornerLight> {
         let faces: Vec<Face> = triangles.iter().map(|t| Face::of(model, *t)).collect();
         let step = (self.places.len() / (PLACES_A_TRIANGLE * faces.len()).max(1)).max(1);
         let seated: Vec<(Seat, &Place)> =
             self.places.iter().step_by(step).filter_map(|p| Some((seat(&faces, p, error_m)?, p))).collect();
-        let [front, back] = [0, 1].map(|side| {
-            let mut held: Vec<Transfer> = self.corners.iter().map(|corner| corner.seen[side]).collect();
-            let seen = seated.iter().filter(|(_, place)| !place.buried[side]);
-            let samples: Vec<_> = seen
-                .map(|(at, place)| Sample { at: *at, weight: place.weight, value: place.light[side] })
-                .collect();
-            fit(&samples, &mut held);
-            held.iter_mut().for_each(bound);
+        by_sides(|side| {
+            let mut held: Vec<_> = self.corners.iter().map(|corner| corner[side]).collect();
+            fit_side(seated.iter().map(|(at, place)| (*at, place.weight, *place)), side, &mut held);
             held
-        });
-        let sides = front.into_iter().zip(back).zip(&self.corners);
-        sides.map(|((front, back), corner)| CornerLight { seen: [front, back], ..*corner }).collect()
+        })
     }
 }
 

@@ -68,10 +68,10 @@ fn places(model: &Model) -> Vec<Place> {
 pub(super) fn lit_places(model: &Model) -> Vec<Place> {
     let mut places = places(model);
     let glances = light_from_outside(model, &mut places);
-    let faces = Faces::of(model);
+    let albedo = face_luminance(model);
     let outside: Vec<[Transfer; 2]> = places.iter().map(|place| place.light).collect();
     for _ in 0..BOUNCES {
-        let thrown = faces.thrown(&places);
+        let thrown = thrown(&albedo, &places);
         for (place, outside) in places.iter_mut().zip(&outside) {
             place.light = *outside;
         }
@@ -91,7 +91,7 @@ pub(super) fn lit_places(model: &Model) -> Vec<Place> {
     places
 }
 
-/// What the sun sends by way of the boat, by where the sun stands, from what the sky's first lobes do: 1 and the three coordinates of the
+/// Light of the sun by way of the boat, by where the sun stands, from that of the sky's first lobes: 1 and the three coordinates of the
 /// direction. Least squares over the half sphere, where their mean products are 1, a half (of 1 and z) and a third (of each with itself).
 fn by_suns_place(thrown: [f32; SUN_TERMS]) -> [f32; SUN_TERMS] {
     let [even, x, y, z] = thrown.map(|of| 0.5 * of);
@@ -175,37 +175,29 @@ fn face_normals(model: &Model) -> Vec<Vec3> {
     model.indices.chunks_exact(3).map(|t| t.iter().map(|i| normal(*i)).sum()).collect()
 }
 
-/// The model's faces as sources of light.
-struct Faces {
-    /// Luminance of their albedo.
-    albedo: Vec<f32>,
+/// Luminance of each face's albedo.
+fn face_luminance(model: &Model) -> Vec<f32> {
+    let mean = model.texture.as_ref().map_or(1.0, mean_luminance);
+    let luminance = |i: u32| model.vertices.get(i as usize).map_or(0.0, |v| v.albedo.dot(LUMINANCE));
+    let faces = model.indices.chunks_exact(3);
+    faces.map(|t| mean * t.iter().map(|i| luminance(*i)).sum::<f32>() / 3.0).collect()
 }
 
-impl Faces {
-    fn of(model: &Model) -> Self {
-        let mean = model.texture.as_ref().map_or(1.0, mean_luminance);
-        let luminance = |i: u32| model.vertices.get(i as usize).map_or(0.0, |v| v.albedo.dot(LUMINANCE));
-        let albedo =
-            model.indices.chunks_exact(3).map(|t| mean * t.iter().map(|i| luminance(*i)).sum::<f32>() / 3.0);
-        Self { albedo: albedo.collect() }
-    }
-
-    /// The radiance of each face, on either side: its albedo times the mean of what its places get that are not buried.
-    fn thrown(&self, places: &[Place]) -> Vec<[Transfer; 2]> {
-        let mut thrown = vec![[DARK; 2]; self.albedo.len()];
-        let mut counts = vec![[0.0_f32; 2]; self.albedo.len()];
-        for place in places {
-            let face = place.face as usize;
-            for side in (0..2).filter(|side| !place.buried[*side]) {
-                counts[face][side] += 1.0;
-                thrown[face][side].iter_mut().zip(place.light[side]).for_each(|(of, light)| *of += light);
-            }
+/// The radiance of each face, on either side: its albedo times the mean of what its places get that are not buried.
+fn thrown(albedo: &[f32], places: &[Place]) -> Vec<[Transfer; 2]> {
+    let mut thrown = vec![[DARK; 2]; albedo.len()];
+    let mut counts = vec![[0.0_f32; 2]; albedo.len()];
+    for place in places {
+        let face = place.face as usize;
+        for side in (0..2).filter(|side| !place.buried[*side]) {
+            counts[face][side] += 1.0;
+            thrown[face][side].iter_mut().zip(place.light[side]).for_each(|(of, light)| *of += light);
         }
-        for ((thrown, counts), albedo) in thrown.iter_mut().zip(counts).zip(&self.albedo) {
-            for (thrown, count) in thrown.iter_mut().zip(counts) {
-                thrown.iter_mut().for_each(|of| *of *= albedo / count.max(1.0));
-            }
-        }
-        thrown
     }
+    for ((thrown, counts), albedo) in thrown.iter_mut().zip(counts).zip(albedo) {
+        for (thrown, count) in thrown.iter_mut().zip(counts) {
+            thrown.iter_mut().for_each(|of| *of *= albedo / count.max(1.0));
+        }
+    }
+    thrown
 }
