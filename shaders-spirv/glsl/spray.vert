@@ -5,8 +5,9 @@
 #include "lens.glsl"
 #include "wake_block.glsl"
 
-layout(location = 1) flat out WakeHead head;
 layout(location = 0) out vec4 spray;  // place on the water, height in the sheet (0 to 1), cover
+layout(location = 1) out vec3 shade;
+layout(location = 2) flat out WakeHead head;
 
 // Steps along a sheet.
 const int STEPS = 10;
@@ -55,5 +56,7 @@ void main() {
     // Seen along itself it is a line, which foam is not.
     float facing = smoothstep(0.1, 0.5, abs(dot(normalize(foot), side)));
     spray.w = head.foam.w * ends * facing * height / shown;
-    gl_Position = clip_from_camera(foot + side * aside + head.up.xyz * (top * shown - 0.05 * shown));
+    vec3 place = foot + side * aside + head.up.xyz * (top * shown - 0.05 * shown);
+    shade = shade_place(head, place);
+    gl_Position = clip_from_camera(place);
 }

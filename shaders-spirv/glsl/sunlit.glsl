@@ -1,19 +1,24 @@
 // How much of the sun reaches a place, by the shadow map: where anything in the map is nearer to the sun, none. The four texels about
 // the place, weighed bilinearly (Reeves, Salesin & Cook 1987, "Rendering antialiased shadows with depth maps", with a filter of two texels).
 
-layout(set = 1, binding = 0) uniform sampler2D shadow_map;
+#ifndef SHADOW_SET
+#define SHADOW_SET 1
+#endif
+layout(set = SHADOW_SET, binding = 0) uniform sampler2D shadow_map;
 
 // Nearer to the sun than all that is ever drawn into the map: nothing shades it.
 const float UNSHADED = 1.5;
 
-// Of the light that the sun sends without shadow, what arrives at `place`: texels, and nearness to the sun, 0 to 1.
-vec3 sunlit(vec3 sun, vec3 place) {
-    if (place.z > UNSHADED || sun.g == 0.0) {
-        return sun;
-    }
+// Share of the sun's light that arrives at `place`: texels, and nearness to the sun, 0 to 1.
+float sun_share(vec3 place) {
     vec2 texel = place.xy - 0.5;
     vec4 nearest = textureGather(shadow_map, (floor(texel) + 1.0) / vec2(textureSize(shadow_map, 0)));
     vec4 lit = vec4(lessThanEqual(nearest, vec4(place.z)));
     vec2 share = fract(texel);
-    return sun * mix(mix(lit.w, lit.z, share.x), mix(lit.x, lit.y, share.x), share.y);
+    return mix(mix(lit.w, lit.z, share.x), mix(lit.x, lit.y, share.x), share.y);
+}
+
+// Of the light that the sun sends without shadow, what arrives at `place`.
+vec3 sunlit(vec3 sun, vec3 place) {
+    return place.z > UNSHADED || sun.g == 0.0 ? sun : sun * sun_share(place);
 }

@@ -12,13 +12,15 @@
 #include "wake_block.glsl"
 #include "wake_light.glsl"
 #include "wake_foam.glsl"
+#include "foam_sunlit.glsl"
 
 // As wake.vert has them.
 layout(location = 0) in vec4 from_eye;
 layout(location = 1) in vec4 track;
 layout(location = 2) in vec4 water;
 layout(location = 3) in vec4 foam;
-layout(location = 4) flat in WakeLight light;
+layout(location = 4) in vec3 shade;
+layout(location = 5) flat in WakeLight light;
 
 layout(location = 0) out vec4 colour;
 
@@ -168,10 +170,14 @@ void main() {
 
     // Bubbles beneath the surface make the water pale, foam hides it.
     float pale = 0.25 * cover.y * share;
-    vec3 paleness = mix(light.foam.rgb * vec3(0.42, 0.60, 0.58), frame.horizon.rgb, haze);
+    vec3 foamed = light.foam.rgb;
+    if (max(white, pale) > 0.0) {
+        foamed = foam_light(foamed, light.shade_foam.rgb, light.shade_box, shade);
+    }
+    vec3 paleness = mix(foamed * vec3(0.42, 0.60, 0.58), frame.horizon.rgb, haze);
     added = mix(added, paleness, pale);
     covered = 1.0 - (1.0 - covered) * (1.0 - pale);
     // Foam is uneven: thick where the lace is.
-    vec3 whiteness = mix(light.foam.rgb * (0.5 + lace), frame.horizon.rgb, haze);
+    vec3 whiteness = mix(foamed * (0.5 + lace), frame.horizon.rgb, haze);
     colour = vec4(mix(added, whiteness, white), 1.0 - (1.0 - covered) * (1.0 - white));
 }

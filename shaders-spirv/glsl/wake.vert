@@ -16,7 +16,8 @@ layout(location = 1) out vec4 track;
 layout(location = 2) out vec4 water;
 // Cover of foam behind the stern, of its bubbles, and of foam beside the hull; half width of the mixed water, metres.
 layout(location = 3) out vec4 foam;
-layout(location = 4) flat out WakeLight light;
+layout(location = 4) out vec3 shade;
+layout(location = 5) flat out WakeLight light;
 
 const float G = 9.81;
 // Seconds after which waves are no longer drawn, as the host's WAVES_S.
@@ -66,6 +67,7 @@ void main() {
     float start = length_m * mix(0.04, 0.4, smoothstep(0.5, 1.1, froude));
     water = vec4(p.world.xy + aside * p.world.zw, i == 0 || i == 4 ? 0.0 : p.track.w, start);
     foam = foam_cover(x, froude, speed, age, length_m, beam);
+    shade = shade_place(head, place);
     light = wake_light(head);
     gl_Position = clip_from_camera(place);
 }

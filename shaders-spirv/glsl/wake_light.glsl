@@ -6,6 +6,8 @@ struct WakeLight {
     vec4 body;
     vec4 mirrored;
     vec4 higher;
+    vec4 shade_box;   // texels of the shadow map that are the boat's
+    vec4 shade_foam;  // rgb: light of whole foam in its shadow
 };
 
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
@@ -17,5 +19,6 @@ WakeLight wake_light(WakeHead head) {
     vec3 higher = head.sea.rgb * (frame.sky.rgb - frame.horizon.rgb);
     return WakeLight(
         vec4(head.hull.xyz, head.up.w * head.up.w), vec4(head.foam.rgb, 0.0), vec4(body, dot(body, LUMINANCE)),
-        vec4(mirrored, dot(mirrored, LUMINANCE)), vec4(higher, dot(higher, LUMINANCE)));
+        vec4(mirrored, dot(mirrored, LUMINANCE)), vec4(higher, dot(higher, LUMINANCE)),
+        head.shade_box, head.shade_foam);
 }

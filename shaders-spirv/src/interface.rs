@@ -369,6 +369,12 @@ block! {
         pub foam: [f32; 4],
         /// What the shader's sea is multiplied with to give the picture's; unused.
         pub sea: [f32; 4],
+        /// Rows of the matrix from camera space to texels of the shadow map and nearness to the sun.
+        pub shade_rows: [[f32; 4]; 3],
+        /// First and last texels, each way, that are the boat's: none where it throws no shadow.
+        pub shade_box: [f32; 4],
+        /// Light of whole foam in the boat's shadow; unused.
+        pub shade_foam: [f32; 4],
     }
 }
 

@@ -463,7 +463,8 @@ impl Plan {
     fn plan_wakes(&mut self, scene: &Scene) {
         for (i, boat) in scene.boats.iter().enumerate().filter(|(_, b)| !b.beyond_horizon) {
             let Some(wake) = &boat.wake else { continue };
-            let WakePlan { block, strips, covered } = wake_plan(scene, boat, wake);
+            let thrown = self.shadows.thrown(i);
+            let WakePlan { block, strips, covered } = wake_plan(scene, (boat, wake), thrown.as_ref());
             let before = self.touched.len();
             self.touched.extend(strip_rects(scene, wake).take(covered).flatten());
             let spray = self.sprayed.iter().any(|(n, _)| *n == i);

@@ -357,7 +357,9 @@ impl<T> Renderer<T> {
         let reflect = self.passes.reflect.as_ref().filter(|_| !plan.reflects.is_empty());
         let mut steps = Steps::default();
         steps.add_memory((PIXELS_DRAWN.0 | PIXELS_COPIED.0, vk::AccessFlags2::NONE), PIXELS_DRAWN);
-        let shadow = self.passes.shadow.as_ref().filter(|_| boats.is_some());
+        // Wakes look it up as well, though no hull be in view.
+        let shaded = boats.is_some() || !plan.wakes.is_empty();
+        let shadow = self.passes.shadow.as_ref().filter(|_| shaded);
         steps.add(shadow.map(ShadowPass::before));
         steps.add(mirror.iter().flat_map(|m| m.before()).flatten());
         steps.add(boats.iter().flat_map(|b| b.before()));

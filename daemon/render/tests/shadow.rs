@@ -16,7 +16,7 @@ use bowwave_core::{
 };
 use common::{
     at, draw, grey,
-    testing::{add_boat_in, box_model, empty_scene},
+    testing::{add_boat_in, add_moving_boat, box_model, empty_scene},
 };
 use glam::{DQuat, DVec3, Vec3};
 
@@ -90,5 +90,43 @@ fn a_boats_light_ends_where_another_stands_before_the_sun() {
         let texel_m = 39.0 / scene.lens.focal.x;
         assert!(code(edge + 2.5 * texel_m) > 100, "lit above {edge} m: {}", code(edge + 2.5 * texel_m));
         assert!(code(edge - 2.5 * texel_m) < 10, "dark below {edge} m: {}", code(edge - 2.5 * texel_m));
+    }
+}
+
+#[test]
+fn a_boat_throws_its_shadow_onto_the_foam_behind_it() {
+    let models = [box_model("box", [8.0, 2.4, 1.5], [0.3; 3])];
+    // Under way to the right at 45 m, seen from 12 m up; the sun as high ahead of it as astern, and lower, and higher.
+    let picture = grey(SIZE.0 * 2, SIZE.1 * 2, 90);
+    for tangent in [0.15_f64, 0.3, 0.6] {
+        let drawn = |ahead: f64| {
+            let mut scene = empty_scene(SIZE.0 * 2, SIZE.1 * 2);
+            (scene.camera.position.z, scene.camera.world_from_camera) = (12.0, look(-0.15, -0.26, 0.0));
+            scene.light.sun_direction = DVec3::new(ahead, 0.0, tangent).normalize();
+            (scene.light.sun, scene.light.sky) = (Vec3::splat(0.5), Vec3::splat(0.25));
+            add_moving_boat(&mut scene, &models, 0, [45.0, 0.0, 0.0], [7.0, 0.0]);
+            for pass in [Pass::Mirror, Pass::Water, Pass::Hud] {
+                scene.passes[pass as usize] = PassDecision::LeftOut(LeftOut::ReflectionOff);
+            }
+            (draw(&scene, &picture, &models), scene)
+        };
+        let ((shaded, scene), (lit, _)) = (drawn(1.0), drawn(-1.0));
+        // Each pixel's code in the middle of the mixed water, so many metres behind the stern.
+        let codes = |behind: f64| {
+            let place = DVec3::new(-4.0 - behind, 45.0, 0.0);
+            let pixel = scene.lens.project(scene.camera.to_camera(place)).unwrap();
+            [&shaded, &lit].map(|p| at(p, SIZE.0 * 2, pixel.x as u32, pixel.y as u32)[1])
+        };
+        let reach = 1.5 / tangent;
+        let steps = |from: f64, to: f64| (0..9).map(move |i| from + (to - from) * f64::from(i) / 8.0);
+        let (mut within, mut beyond) = ((0, 0), 0);
+        for [dark, bright] in steps(0.15 * reach, 0.8 * reach).map(codes) {
+            within = (within.0 + u32::from(dark), within.1 + u32::from(bright));
+        }
+        for [dark, bright] in steps(1.25 * reach, 1.25 * reach + 3.0).map(codes) {
+            beyond = beyond.max(dark.abs_diff(bright));
+        }
+        assert!(beyond <= 1, "no shadow beyond {reach:.1} m, {beyond} codes");
+        assert!(within.0 * 20 < within.1 * 19, "a shadow up to {reach:.1} m: {within:?}");
     }
 }

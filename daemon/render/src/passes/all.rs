@@ -64,8 +64,9 @@ impl Passes {
             _ => None,
         };
         let boats = drawn.map(|drawn| BoatsPass::new(context, drawn, textured)).transpose()?;
-        let wake = boats.as_ref().filter(|_| needs.wakes_max > 0);
-        let wake = wake.map(|boats| WakePass::new(context, boats)).transpose()?;
+        let shadow_map = shadow.as_ref().map(|shadow| &shadow.map);
+        let wake = boats.as_ref().zip(shadow_map).filter(|_| needs.wakes_max > 0);
+        let wake = wake.map(|drawn| WakePass::new(context, drawn)).transpose()?;
         let over = boats.as_ref();
         let lamplight = needs.lamps.then(|| LamplightPass::new(context)).transpose()?;
         let lights = BehindHulls::when(needs.lights_max > 0, context, &lights::SHADERS, over)?;

@@ -8,7 +8,7 @@ use bowwave_core::{
     geometry::RigidPose,
     model::{Model, ModelId, ModelKind},
 };
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use shaders_spirv::interface::ShadowBlock;
 
 use crate::{
@@ -115,6 +115,16 @@ impl SunView {
     }
 }
 
+/// What a boat hides from the sun of all that lies behind it, by its place in the map.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ThrownShadow {
+    /// Rows of the matrix from the world to texels and nearness to the sun.
+    pub(crate) from_world: [[f64; 4]; 3],
+    /// The texels that are the boat's.
+    pub(crate) low: DVec2,
+    pub(crate) high: DVec2,
+}
+
 /// One frame's shadow map.
 #[derive(Default)]
 pub(crate) struct ShadowPlan {
@@ -142,6 +152,23 @@ impl ShadowPlan {
     /// The shade of a boat of the scene, by its number there.
     pub(crate) fn shade(&self, boat: usize) -> &Shade {
         self.shades.get(boat).unwrap_or(&Shade::NONE)
+    }
+
+    /// The shadow that a boat of the scene, by its number there, throws behind itself; none where it has no place in the map.
+    pub(crate) fn thrown(&self, boat: usize) -> Option<ThrownShadow> {
+        /// What is nearer to the edge of a place than this, texels, is not looked up: its neighbours are another's.
+        const EDGE: f64 = 1.0;
+        let view = self.views.get(boat)?.as_ref()?;
+        let world = RigidPose { world_from_body: DQuat::IDENTITY, position: DVec3::ZERO };
+        let ((wanted, _), placed) = self.wanted.get(boat).zip(self.places.get(boat))?;
+        let PixelRect { x, y, width, height } = placed.place;
+        let low = DVec2::new(f64::from(x), f64::from(y));
+        let size = DVec2::new(f64::from(width), f64::from(height));
+        Some(ThrownShadow {
+            from_world: view.rows(&world, wanted, placed),
+            low: low + EDGE,
+            high: low + size - EDGE,
+        })
     }
 
     pub(crate) fn clear(&mut self) {

@@ -1,5 +1,5 @@
 //! Waves and foam of boats under way: one ribbon along each boat's track, drawn over the sea and its reflections, beneath the boats; and
-//! the foam that stands up beside a hull, after them, where no hull hides it.
+//! the foam that stands up beside a hull, after them, where no hull hides it. On both falls the boat's own shadow.
 
 pub(crate) mod plan;
 
@@ -36,10 +36,14 @@ pub(crate) struct WakePass {
     pipeline: Pipeline,
     spray: Pipeline,
     depth: TextureSet,
+    shadow: vk::DescriptorSet,
 }
 
 impl WakePass {
-    pub(crate) fn new(context: &PassContext<'_>, boats: &boats::BoatsPass) -> Result<Self, RenderError> {
+    pub(crate) fn new(
+        context: &PassContext<'_>,
+        (boats, shadow): (&boats::BoatsPass, &TextureSet),
+    ) -> Result<Self, RenderError> {
         let depth = boats.hull_depth(context)?;
         let lens = context.vertex_constants();
         let pipeline = |vertex: Shader, fragment: Shader, sets: &[&SetLayout]| {
@@ -47,15 +51,16 @@ impl WakePass {
             Pipeline::new(context.gpu, &PipelineShape { vertex_constants: &lens, ..shape })
         };
         Ok(Self {
-            pipeline: pipeline(WAKE_VERT, WAKE_FRAG, &[context.frame_set])?,
-            spray: pipeline(SPRAY_VERT, SPRAY_FRAG, &[context.frame_set, &depth.layout])?,
+            pipeline: pipeline(WAKE_VERT, WAKE_FRAG, &[context.frame_set, &shadow.layout])?,
+            spray: pipeline(SPRAY_VERT, SPRAY_FRAG, &[context.frame_set, &depth.layout, &shadow.layout])?,
             depth,
+            shadow: shadow.set,
         })
     }
 
     /// Draws, within a rendering to the screen.
     pub(crate) fn record(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, wakes: &[WakeDraw]) {
-        to.bind(&self.pipeline, &[frame]);
+        to.bind(&self.pipeline, &[frame, self.shadow]);
         for wake in wakes.iter().filter(|w| w.strips > 0) {
             to.push(&self.pipeline, &DrawBlock { index: wake.index, ..DrawBlock::default() });
             to.draw(CORNERS, wake.strips);
@@ -64,7 +69,7 @@ impl WakePass {
 
     /// Draws what stands up beside the hulls, within a rendering to the screen. The boats' depth is ready to be sampled.
     pub(crate) fn record_spray(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, wakes: &[WakeDraw]) {
-        to.bind(&self.spray, &[frame, self.depth.set]);
+        to.bind(&self.spray, &[frame, self.depth.set, self.shadow]);
         for wake in wakes.iter().filter(|w| w.spray) {
             to.push(&self.spray, &DrawBlock { index: wake.index, ..DrawBlock::default() });
             to.draw(SHEET_CORNERS, SHEETS);

@@ -8,12 +8,16 @@ use bowwave_core::{
         view::{bounds, clip_to_screen},
         wake::{FOAM_FROUDE, FOLLOWED_S, SPEED_MIN_M_S, TrackPoint, Wake, froude, height_m},
     },
+    geometry::CameraPose,
     sea::{fresnel, mean_square_slope},
 };
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use shaders_spirv::interface::{TRACK_POINTS, WakeBlock, WakeHead, WakePoint};
 
-use crate::passes::water::{SEEN_DOWN, block::mirrored_sky};
+use crate::passes::{
+    shadow::plan::ThrownShadow,
+    water::{SEEN_DOWN, block::mirrored_sky},
+};
 
 const _: () = assert!(TRACK_POINTS == bowwave_core::frame::wake::TRACK_POINTS);
 
@@ -30,18 +34,28 @@ pub(crate) struct WakePlan {
 }
 
 /// What is drawn of a boat's wake: where points of the track are seen close to each other, some are left out.
-pub(crate) fn wake_plan(scene: &Scene, boat: &BoatView, wake: &Wake) -> WakePlan {
+/// The boat's shadow on it falls by `thrown`.
+pub(crate) fn wake_plan(
+    scene: &Scene,
+    (boat, wake): (&BoatView, &Wake),
+    thrown: Option<&ThrownShadow>,
+) -> WakePlan {
     let camera = &scene.camera;
     let camera_from_world = DMat3::from_quat(camera.world_from_camera.inverse());
     let with = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
     let light = |v: Vec3, w: f64| v.extend(w as f32).to_array();
-    let (high, thrown) = spray(scene, boat, wake);
+    let (high, sprayed) = spray(scene, boat, wake);
+    let lamps = foam_at(&scene.lamps, boat.pose.position);
     let rough = mean_square_slope(scene.wind.length()).sqrt();
     let head = WakeHead {
         up: with(camera_from_world * DVec3::Z, rough),
         hull: [wake.hull.length_m as f32, wake.hull.beam_m as f32, boat.haze, high as f32],
-        foam: light(foam_light(scene.light.on_level() + foam_at(&scene.lamps, boat.pose.position)), thrown),
+        foam: light(foam_light(scene.light.on_level() + lamps), sprayed),
         sea: light(sea_fit(&scene.light, rough), 0.0),
+        ..thrown.map_or_else(WakeHead::default, |thrown| WakeHead {
+            shade_foam: light(foam_light(scene.light.sky + lamps), 0.0),
+            ..shade(thrown, camera)
+        })
     };
     let mut block = WakeBlock { head, ..WakeBlock::default() };
     let points = wake.points();
@@ -75,6 +89,18 @@ pub(crate) fn wake_plan(scene: &Scene, boat: &BoatView, wake: &Wake) -> WakePlan
         strips: last.min(count.saturating_sub(1)) as u32,
         covered: covered.min(points.len().saturating_sub(1)),
     }
+}
+
+/// A boat's shadow as the wake's shaders look it up: from camera space, in which their places are exact.
+fn shade(thrown: &ThrownShadow, camera: &CameraPose) -> WakeHead {
+    let world_from_camera = DMat3::from_quat(camera.world_from_camera);
+    let shade_rows = thrown.from_world.map(|row| {
+        let along = DVec3::new(row[0], row[1], row[2]);
+        let at_camera = along.dot(camera.position) + row[3];
+        (world_from_camera.transpose() * along).extend(at_camera).as_vec4().to_array()
+    });
+    let (low, high) = (thrown.low.as_vec2(), thrown.high.as_vec2());
+    WakeHead { shade_rows, shade_box: [low.x, low.y, high.x, high.y], ..WakeHead::default() }
 }
 
 /// Whether the strip from a point to the next is seen so thin that it may go on to the one after that.
@@ -229,7 +255,7 @@ mod tests {
     fn a_wake_finer_than_the_picture_is_left_out_and_fades_before() {
         let share_at = |range: f64| {
             let (scene, boat) = seen(range);
-            wake_plan(&scene, &boat, &wake(range, 7.0)).block.points[3].track[3]
+            wake_plan(&scene, (&boat, &wake(range, 7.0)), None).block.points[3].track[3]
         };
         let (near, far, gone) = (share_at(60.0), share_at(200.0), share_at(900.0));
         assert!(near > 0.9 && far < near && far > 0.0, "{near} {far}");
@@ -243,7 +269,7 @@ mod tests {
         testing::add_moving_boat(&mut scene, &models, 0, [70.0, 0.0, 0.4], [7.0, 0.1]);
         let boat = scene.boats.remove(0);
         let wake = boat.wake.unwrap();
-        let plan = wake_plan(&scene, &boat, &wake);
+        let plan = wake_plan(&scene, (&boat, &wake), None);
         assert!(plan.strips >= 8 && (plan.strips as usize) < plan.covered, "{}", plan.strips);
         let rects: Vec<_> = strip_rects(&scene, &wake).take(plan.covered).flatten().collect();
         for p in &plan.block.points[..plan.strips as usize] {
