@@ -44,7 +44,7 @@ pub(crate) struct Meshes {
     _sampler: Sampler,
 }
 
-/// Simplifies each of `models` on a thread of its own: what its corners see of the sky takes a fifth of a second a boat, and nobody trains
+/// Simplifies each of `models` on a thread of its own: what its corners see of the sky takes half a second a boat, and nobody trains
 /// before that is done.
 fn simplify_all(models: &[Model], bent: bool) -> Vec<Simplified> {
     thread::scope(|scope| {

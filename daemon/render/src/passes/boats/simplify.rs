@@ -11,10 +11,12 @@ use shaders_spirv::interface::MeshVertex;
 use crate::{
     passes::boats::parts::Parts,
     passes::boats::split::{EDGE_PX, split},
-    passes::boats::transfer::{CornerLight, baked_light},
+    passes::boats::transfer::{BakedLight, CornerLight, SEA, baked_light},
     view::DETAIL_PX,
 };
 
+/// Error of the model that is drawn whole, metres: what is within it is nothing but triangles.
+const ERROR_WHOLE_M: f32 = 0.004;
 /// Error of the finest simplified level, metres; each level has twice the error of the one before.
 const ERROR_MIN_M: f32 = 0.008;
 /// No model is simplified to fewer triangles.
@@ -24,6 +26,13 @@ const NORMAL_WEIGHT: f32 = 0.5;
 const FAR_NORMAL_WEIGHT: f32 = 1.5;
 const ALBEDO_WEIGHT: f32 = 6.0;
 
+/// As how many metres of distance a whole change of light counts: of what it gets of the sky's first lobes and of the sea, all of the first and
+/// a part of the rest.
+const LIGHT_M: f32 = 0.8;
+/// Up to this error, metres, levels are made of the finer surface that holds light; farther off the model's own triangles hold enough.
+const FINE_M: f32 = 0.04;
+const LIGHT_TERMS: [(usize, f32); 4] = [(0, 1.0), (1, 0.4), (2, 0.4), (SEA, 0.4)];
+
 /// Up to this error, metres, triangles on either side of an edge between two colours or of a sharp edge stay apart: stripes and gunwales are pixels wide
 /// there, and boats that near are few. Farther off a boat has half as many triangles without.
 const SEAMS_M: f32 = 0.1;
@@ -31,7 +40,7 @@ const SEAMS_M: f32 = 0.1;
 /// A model at one level of detail, as ranges of indices.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Level {
-    /// How far the surface is from the model's, tenths of millimetres; 0 for the model as it is.
+    /// How far the surface is from the model's, tenths of millimetres; 0 for the whole, which is within [`ERROR_WHOLE_M`].
     error_tenth_mm: u32,
     /// Triangles of closed parts: back faces can be left out.
     pub(crate) closed: Range<u32>,
@@ -70,32 +79,42 @@ fn least_pixel_m(error_m: f32, size_m: f32) -> f32 {
 /// Makes the levels of `model`, whose indices are known to lie within its vertices; without long edges where a lens is `bent`.
 pub(crate) fn simplify(model: &Model, bent: bool) -> Simplified {
     /// A level is kept if it has at most this share of the triangles of the one before.
-    const WORTHWHILE: f64 = 0.8;
+    const WORTHWHILE: f64 = 0.85;
     let light = baked_light(model);
-    let triangles: Vec<[u32; 3]> = model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-    let parts = Parts::of(model);
-    let closed: Vec<bool> = triangles.iter().map(|t| parts.closed(t[0])).collect();
+    let surface = &light.surface;
+    let parts = Parts::of(surface);
     let size_m = (model.max - model.min).max_element();
     let mut all = Simplified { bent, size_m, ..Simplified::default() };
-    all.push(0.0, &triangles, &closed, Corners::new(model, &light.corners));
+    let mut push = |error: f32, triangles: &[[u32; 3]], corners: &[CornerLight]| {
+        let closed: Vec<bool> = triangles.iter().map(|t| parts.closed(t[0])).collect();
+        all.push(error, triangles, &closed, Corners::new(surface, corners));
+    };
     // A texture's seams would tear, and a picture has few triangles anyway.
     if model.texture.is_some() || model.kind == ModelKind::Quad {
+        push(0.0, &triangles(&surface.indices), &light.corners);
         return all;
     }
-    let mut last = triangles.len();
+    let whole = triangles(&with_error(&light, model, &parts, ERROR_WHOLE_M));
+    if whole.is_empty() {
+        push(0.0, &triangles(&surface.indices), &light.corners);
+        return all;
+    }
+    let mut last = whole.len();
+    push(0.0, &whole, &light.on_level(&whole, ERROR_WHOLE_M));
     let mut error = ERROR_MIN_M;
-    let largest = (model.max - model.min).max_element() / 8.0;
-    while error < largest && last > TRIANGLES_MIN {
-        let fewer = with_error(model, &parts, error);
+    while error < size_m / 8.0 && last > TRIANGLES_MIN {
+        let fewer = triangles(&with_error(&light, model, &parts, error));
         if !fewer.is_empty() && fewer.len() as f64 <= WORTHWHILE * last as f64 {
             last = fewer.len();
-            let closed: Vec<bool> = fewer.iter().map(|t| parts.closed(t[0])).collect();
-            let corners = light.on_level(model, &fewer, error);
-            all.push(error, &fewer, &closed, Corners::new(model, &corners));
+            push(error, &fewer, &light.on_level(&fewer, error));
         }
         error *= 2.0;
     }
     all
+}
+
+fn triangles(indices: &[u32]) -> Vec<[u32; 3]> {
+    indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
 }
 
 /// The corners of one level: those of open shells are seen and lit from both sides, and each side has its own.
@@ -151,37 +170,40 @@ fn lit_corner(v: &Vertex, light: &CornerLight, side: usize) -> MeshVertex {
     }
 }
 
-/// The triangles of `model` that keep its surface within `error` metres, its shading and colours likewise.
-fn with_error(model: &Model, parts: &Parts, error: f32) -> Vec<[u32; 3]> {
-    let positions: Vec<[f32; 3]> = model.vertices.iter().map(|v| v.position.to_array()).collect();
+/// The triangles that keep the surface within `error` metres, its shading, colours and light likewise.
+fn with_error(light: &BakedLight, model: &Model, parts: &Parts, error: f32) -> Vec<u32> {
+    let surface = &light.surface;
+    let positions: Vec<[f32; 3]> = surface.vertices.iter().map(|v| v.position.to_array()).collect();
     let Ok(adapter) = VertexDataAdapter::new(bytemuck::cast_slice(&positions), size_of::<[f32; 3]>(), 0)
     else {
         return Vec::new();
     };
-    let attributes: Vec<f32> = model
-        .vertices
-        .iter()
-        .flat_map(|v| v.normal.to_array().into_iter().chain(v.albedo.to_array()))
-        .collect();
-    let locks: Vec<bool> = (0..model.vertices.len() as u32).map(|v| parts.is_panel(v, error)).collect();
     let far = error > SEAMS_M;
     let normal = if far { FAR_NORMAL_WEIGHT } else { NORMAL_WEIGHT } * error;
     let albedo = ALBEDO_WEIGHT * error;
-    let weights = [normal, normal, normal, albedo, albedo, albedo];
+    let mut weights = vec![normal, normal, normal, albedo, albedo, albedo];
+    // Weights are in parts of the extent.
+    let light_weight = LIGHT_M / (model.max - model.min).max_element().max(0.1);
+    weights.extend(LIGHT_TERMS.iter().chain(&LIGHT_TERMS).map(|(_, part)| part * light_weight));
+    let mut attributes: Vec<f32> = Vec::with_capacity(weights.len() * surface.vertices.len());
+    for (v, held) in surface.vertices.iter().zip(&light.corners) {
+        attributes.extend(v.normal.to_array().into_iter().chain(v.albedo.to_array()));
+        attributes.extend(held.iter().flat_map(|held| LIGHT_TERMS.map(|(term, _)| held[term])));
+    }
+    let locks: Vec<bool> = (0..surface.vertices.len() as u32).map(|v| parts.is_panel(v, error)).collect();
     let seams = if far { SimplifyOptions::Permissive } else { SimplifyOptions::None };
-    let fewer = simplify_with_attributes_and_locks(
-        &model.indices,
+    simplify_with_attributes_and_locks(
+        if error > FINE_M { &model.indices } else { &surface.indices },
         &adapter,
         &attributes,
         &weights,
-        size_of_val(&weights),
+        size_of_val(&weights[..]),
         &locks,
         TRIANGLES_MIN * 3,
         error,
         SimplifyOptions::ErrorAbsolute | SimplifyOptions::Prune | seams,
         None,
-    );
-    fewer.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
+    )
 }
 
 impl Simplified {
@@ -225,8 +247,17 @@ mod tests {
         assert_eq!((level.closed.len(), level.open.len()), (36, 0));
         let mut open = model.clone();
         open.indices.truncate(30);
-        let level = &simplify(&open, false).levels[0];
-        assert_eq!((level.closed.len(), level.open.len()), (0, 60));
+        let made = simplify(&open, false);
+        let level = &made.levels[0];
+        // Five sides, each drawn both ways round: their corners may be more, their area is not.
+        assert!(level.closed.is_empty() && level.open.len() >= 60);
+        let at = |i: &u32| Vec3::from(made.vertices[*i as usize].position);
+        let area: f32 = (made.indices[level.open.start as usize..level.open.end as usize].chunks_exact(3))
+            .map(|t| 0.5 * (at(&t[1]) - at(&t[0])).cross(at(&t[2]) - at(&t[0])).length())
+            .sum();
+        let [length, beam, height] = (model.max - model.min).to_array();
+        let sides = 2.0 * (length + beam) * height + length * beam;
+        assert!((area - 2.0 * sides).abs() < 0.001 * area, "{area}, not twice {sides}");
         let mut inverted = model;
         inverted.indices.chunks_exact_mut(3).for_each(|t| t.swap(0, 1));
         assert_eq!(simplify(&inverted, false).levels[0].closed.len(), 0);
@@ -260,6 +291,12 @@ mod tests {
             let model = bowwave_models::resolve(name, std::path::Path::new(".")).unwrap();
             let made = simplify(&model, false);
             assert!(made.levels.len() > 3, "{name}: {} levels", made.levels.len());
+            // The whole holds light with few triangles more than the model has.
+            let whole = made.levels[0].closed.len() + made.levels[0].open.len();
+            let parts = Parts::of(&model);
+            let drawn = |t: &[u32]| if parts.closed(t[0]) { 3 } else { 6 };
+            let of_model: usize = model.indices.chunks_exact(3).map(drawn).sum();
+            assert!(whole as f64 <= 1.3 * of_model as f64, "{name}: {whole} of {of_model}");
             let mut last = u32::MAX;
             for level in &made.levels {
                 let count = (level.closed.len() + level.open.len()) as u32;

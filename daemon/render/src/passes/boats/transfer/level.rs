@@ -3,19 +3,24 @@
 use bowwave_core::model::Model;
 use glam::Vec3;
 
-use super::{BakedLight, CornerLight, by_sides, fit::Seat, fit_side, places::Place};
+use super::{BakedLight, CornerLight, by_sides, fit::Seat, fit_side, places::Place, rays::Rays};
 
 /// Places that are looked at for each triangle of a level.
-const PLACES_A_TRIANGLE: usize = 12;
+const PLACES_A_TRIANGLE: usize = 8;
 
 impl BakedLight {
-    /// Light of the corners where `model` is drawn by `triangles` that lie within `error_m` of it: least squares of what its surface gets.
-    /// Corners keep what they hold where none of the surface is nearest to their triangles.
-    pub(crate) fn on_level(&self, model: &Model, triangles: &[[u32; 3]], error_m: f32) -> Vec<CornerLight> {
-        let faces: Vec<Face> = triangles.iter().map(|t| Face::of(model, *t)).collect();
+    /// Light of the corners where the surface is drawn by `triangles` that lie within `error_m` of it: least squares of what it gets. Corners
+    /// keep what they hold where none of the surface is nearest to their triangles.
+    pub(crate) fn on_level(&self, triangles: &[[u32; 3]], error_m: f32) -> Vec<CornerLight> {
+        let faces: Vec<Face> = triangles.iter().map(|t| Face::of(&self.surface, *t)).collect();
+        let tree = Rays::of_triangles(faces.iter().map(|face| face.positions));
         let step = (self.places.len() / (PLACES_A_TRIANGLE * faces.len()).max(1)).max(1);
-        let seated: Vec<(Seat, &Place)> =
-            self.places.iter().step_by(step).filter_map(|p| Some((seat(&faces, p, error_m)?, p))).collect();
+        let seated: Vec<(Seat, &Place)> = self
+            .places
+            .iter()
+            .step_by(step)
+            .filter_map(|p| Some((seat(&faces, &tree, p, error_m)?, p)))
+            .collect();
         by_sides(|side| {
             let mut held: Vec<_> = self.corners.iter().map(|corner| corner[side]).collect();
             fit_side(seated.iter().map(|(at, place)| (*at, place.weight, *place)), side, &mut held);
@@ -30,45 +35,41 @@ struct Face {
     positions: [Vec3; 3],
     /// Of the corners' own normals: the side that counts as the front.
     normal: Vec3,
-    middle: Vec3,
-    radius: f32,
 }
 
 impl Face {
     fn of(model: &Model, triangle: [u32; 3]) -> Self {
         let vertices = triangle.map(|i| &model.vertices[i as usize]);
         let positions = vertices.map(|v| v.position);
-        let middle = positions.iter().sum::<Vec3>() / 3.0;
         Self {
             corners: triangle.map(|i| i as usize),
             positions,
             normal: vertices.iter().map(|v| v.normal).sum::<Vec3>().normalize_or(Vec3::Z),
-            middle,
-            radius: positions.iter().map(|p| p.distance(middle)).fold(0.0, f32::max),
         }
     }
 }
 
 /// The place on a level that stands for a place on the model: the nearest, where turning away counts as distance; `None` of no triangles.
-fn seat(faces: &[Face], place: &Place, error_m: f32) -> Option<Seat> {
+fn seat(faces: &[Face], tree: &Rays, place: &Place, error_m: f32) -> Option<Seat> {
     /// A face that stands at right angles counts as so many errors farther away.
     const TURNED: f32 = 2.0;
     let mut nearest = 2.25 * error_m * error_m;
     let mut found = None;
-    for face in faces.iter().filter(|f| f.normal.dot(place.normal) > 0.5) {
-        let apart = (place.position.distance(face.middle) - face.radius).max(0.0);
-        let turned = (TURNED * error_m).powi(2) * (1.0 - face.normal.dot(place.normal));
-        if apart * apart + turned >= nearest {
-            continue;
+    tree.near(place.position, nearest, |number| {
+        let face = &faces[number as usize];
+        let along = face.normal.dot(place.normal);
+        let turned = (TURNED * error_m).powi(2) * (1.0 - along);
+        if along > 0.5 && turned < nearest {
+            let shares = nearest_shares(place.position, face.positions);
+            let there: Vec3 = face.positions.iter().zip(shares).map(|(p, share)| *p * share).sum();
+            let distance = there.distance_squared(place.position) + turned;
+            if distance < nearest {
+                nearest = distance;
+                found = Some(Seat { corners: face.corners, shares });
+            }
         }
-        let shares = nearest_shares(place.position, face.positions);
-        let there: Vec3 = face.positions.iter().zip(shares).map(|(p, share)| *p * share).sum();
-        let distance = there.distance_squared(place.position) + turned;
-        if distance < nearest {
-            nearest = distance;
-            found = Some(Seat { corners: face.corners, shares });
-        }
-    }
+        nearest
+    });
     found
 }
 
