@@ -276,3 +276,48 @@ fn a_picture_is_traced_on_and_a_missing_desktop_says_so() {
     let said = said(&output);
     assert!(said.contains("--outline") && said.contains("--picture") && said.contains("DISPLAY"), "{said}");
 }
+
+#[test]
+fn without_a_camera_the_live_view_says_what_to_do() {
+    let bench = Bench::new();
+    let config = bench.path("bowwave.toml");
+    let camera = "[camera]\ndevice = \"/dev/v4l/by-id/usb-No_Such_Camera\"\n";
+    fs::write(&config, camera).unwrap();
+    let live = ["--live", "--seconds", "1", "--config", config.to_str().unwrap()];
+    for more in [&[][..], &["--trace"]] {
+        let output = bench.phantom(&[&live[..], more].concat());
+        expect_code(&output, 1);
+        let said = said(&output);
+        for part in ["no pictures from the camera", "No_Such_Camera", "bowwave doctor --config"] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+        assert!(!said.contains("without stop"), "the camera is not closed: {said}");
+    }
+    // The calibration may be the configuration's; without any nothing is opened.
+    let bare = |text: &str| {
+        fs::write(&config, text).unwrap();
+        bowwave([&["calibrate", "phantom"], &live[..]].concat())
+    };
+    let output = bare(camera);
+    expect_code(&output, 1);
+    assert!(said(&output).contains("names no calibration"), "{}", said(&output));
+    let output = bare(&format!("[files]\ncalibration = \"absent.toml\"\n{camera}"));
+    expect_code(&output, 1);
+    assert!(said(&output).contains("bowwave calibrate wizard"), "{}", said(&output));
+    let output = bare(&format!("[files]\ncalibration = \"cal.toml\"\n{camera}"));
+    expect_code(&output, 1);
+    assert!(said(&output).contains("No_Such_Camera"), "{}", said(&output));
+}
+
+#[test]
+fn the_live_view_is_instead_of_a_recording() {
+    let bench = Bench::new();
+    for wrong in [&["--live", "a.mcap"][..], &["--trace"], &["a.mcap", "--config", "b.toml"]] {
+        expect_code(&bench.phantom(wrong), 2);
+    }
+    let help = bowwave(["calibrate", "phantom", "--help"]);
+    expect_code(&help, 0);
+    assert!(String::from_utf8_lossy(&help.stdout).contains("--live"));
+    let completions = bowwave(["completions", "bash"]);
+    assert!(String::from_utf8_lossy(&completions.stdout).contains("--live --config --seconds"));
+}

@@ -6,20 +6,34 @@ use bowwave_calibration::plane::{PlaneFrame, SeenPoint};
 use clap::Args;
 use glam::{DVec2, DVec3};
 
-use super::mounting::{CalibrationFiles, parse_mark};
+use super::{
+    CONFIG,
+    mounting::{CalibrationFiles, parse_mark},
+};
 
 /// Arguments of `calibrate phantom`.
 #[derive(Debug, Args)]
 pub struct CalibratePhantom {
     /// Recording (MCAP) in which the gun turns and tilts at the sea without firing, so that sea passes behind all of it; or, to trace on it by
     /// hand, a picture (PNG, JPEG) as the camera took it
-    #[arg(required_unless_present_any = ["outline", "model"])]
+    #[arg(group = "seen", required_unless_present_any = ["outline", "model", "live"])]
     pub recording: Option<PathBuf>,
+    /// Take the camera's pictures as they come instead of a recording: the gun turns and tilts at the sea meanwhile, or is traced by hand on their
+    /// mean (--trace); the trainer must not run meanwhile
+    #[arg(long, group = "seen", conflicts_with_all = ["outline", "model"])]
+    pub live: bool,
+    /// Configuration (TOML) that names camera and calibration, with --live
+    #[arg(long, value_name = "FILE", default_value = CONFIG, requires = "live", conflicts_with_all = ["recording", "outline", "model"])]
+    pub config: PathBuf,
+    /// How long pictures are taken, with --live; without it 30, or 3 to trace
+    #[arg(long, value_name = "SECONDS", requires = "live", value_parser = clap::value_parser!(u32).range(1..=600))]
+    pub seconds: Option<u32>,
     /// Trace a part by hand instead: its corners in pixels in order, once for each part; parts that touch must overlap
     #[arg(long, value_name = "[NAME=]X,Y X,Y X,Y...", value_parser = parse_outline, conflicts_with_all = ["trace", "model"])]
     pub outline: Vec<TracedOutline>,
-    /// Trace by hand in a window, with mouse or keys; it shows what the recording tells and what the calibration has
-    #[arg(long, conflicts_with = "model", requires = "recording")]
+    /// Trace by hand in a window, with mouse or keys, on a recording, a picture or the camera (--live); it shows what the pictures tell and what the
+    /// calibration has
+    #[arg(long, conflicts_with = "model", requires = "seen")]
     pub trace: bool,
     /// Take the outlines from a model of the gun instead (glTF 2.0, .glb or .gltf): triangles in metres, x left, y up, z along the bore; each named
     /// node is a part

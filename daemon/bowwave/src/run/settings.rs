@@ -317,11 +317,17 @@ fn why_and_instead(why: &anyhow::Error, instead: &str) -> anyhow::Error {
 pub fn camera_settings(settings: &Settings) -> CameraSettings {
     let lens = &settings.setup.calibration.lens;
     let calibrated = !settings.calibration_toml.is_empty();
-    let mut camera = settings.config.camera.clone();
-    camera.calibrated_size = calibrated.then_some((lens.width, lens.height));
+    let size = calibrated.then_some((lens.width, lens.height));
+    camera_of(&settings.config, size, &settings.camera_serial)
+}
+
+/// The configuration's camera, with the size and serial number of the calibration; the number may be empty.
+pub fn camera_of(config: &Config, calibrated_size: Option<(u32, u32)>, serial: &str) -> CameraSettings {
+    let mut camera = config.camera.clone();
+    camera.calibrated_size = calibrated_size;
     // The configuration can name another one, for a camera that was exchanged for its like.
-    if camera.serial.is_none() && !settings.camera_serial.is_empty() {
-        camera.serial = Some(settings.camera_serial.clone());
+    if camera.serial.is_none() && !serial.is_empty() {
+        camera.serial = Some(serial.to_owned());
     }
     camera
 }

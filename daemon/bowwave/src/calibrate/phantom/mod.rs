@@ -1,5 +1,6 @@
 //! `bowwave calibrate phantom`: what the camera sees of the gun itself, by its outlines.
 
+mod live;
 mod model;
 mod plane;
 mod source;
@@ -8,7 +9,10 @@ mod trace;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use bowwave_calibration::outline::{FoundOutlines, OutlineFinder};
+use bowwave_calibration::{
+    CalibrationFile,
+    outline::{FoundOutlines, OutlineFinder},
+};
 use bowwave_core::own_ship::{OwnShip, Phantom};
 use glam::DVec2;
 use image::{Rgb, RgbImage};
@@ -29,7 +33,15 @@ const LINE: [u8; 3] = [255, 40, 40];
 
 /// Finds or takes the outlines, tells them and writes.
 pub fn run(arguments: &CalibratePhantom) -> Result<Outcome> {
-    let seen = Seen::open(arguments.recording.as_deref(), arguments.files.calibration.as_deref())?;
+    let seen = Seen::open(arguments)?;
+    let ended = work(arguments, &seen);
+    let closed = seen.close();
+    let outcome = ended?;
+    closed?;
+    Ok(outcome)
+}
+
+fn work(arguments: &CalibratePhantom, seen: &Seen) -> Result<Outcome> {
     if arguments.plane.is_some() {
         return plane::run(arguments, seen.file());
     }
@@ -39,7 +51,7 @@ pub fn run(arguments: &CalibratePhantom) -> Result<Outcome> {
     let are_known = !arguments.outline.is_empty() || arguments.model.is_some();
     let is_cut = if are_known && arguments.picture.is_none() { false } else { seen.show(&mut finder)? };
     if arguments.trace {
-        return traced(arguments, seen, &finder, is_cut);
+        return traced(arguments, seen, finder, is_cut);
     }
     let (found, mut notes) = if let Some(path) = &arguments.model {
         model::outlines(path, arguments, seen.file())?
@@ -47,11 +59,11 @@ pub fn run(arguments: &CalibratePhantom) -> Result<Outcome> {
         let part = |t: &TracedOutline| Phantom::new(t.name.as_str(), t.corners.clone(), size);
         let phantoms = arguments.outline.iter().map(part).collect();
         (FoundOutlines { phantoms, ..FoundOutlines::default() }, Vec::new())
-    } else if let Seen::Recording(_) = seen {
+    } else if let Seen::Recording(_) | Seen::Live(_) = seen {
         (finder.find()?, Vec::new())
     } else {
         bail!(
-            "one picture does not tell what keeps still: trace the gun on it with --trace or --outline, or give a recording"
+            "one picture does not tell what keeps still: trace the gun on it with --trace or --outline, or give a recording or --live"
         );
     };
     notes.extend(notes_on(&found, arguments.model.is_some()));
@@ -61,23 +73,29 @@ pub fn run(arguments: &CalibratePhantom) -> Result<Outcome> {
 }
 
 /// Lets somebody trace in a window.
-fn traced(arguments: &CalibratePhantom, seen: Seen, finder: &OutlineFinder, is_cut: bool) -> Result<Outcome> {
+fn traced(
+    arguments: &CalibratePhantom,
+    seen: &Seen,
+    mut finder: OutlineFinder,
+    is_cut: bool,
+) -> Result<Outcome> {
     let lens = &seen.file().calibration.lens;
     let size = (lens.width, lens.height);
-    let told = match &seen {
-        Seen::Recording(_) => finder.find().unwrap_or_else(|why| {
-            eprintln!("the recording itself tells no outline: {why}");
+    let told = match seen {
+        Seen::Recording(_) | Seen::Live(_) => finder.find().unwrap_or_else(|why| {
+            eprintln!("the pictures themselves tell no outline: {why}");
             FoundOutlines::default()
         }),
         _ => FoundOutlines::default(),
     };
-    let picture = seen.picture(finder);
-    let Some(phantoms) = trace::trace(&picture, size, &seen.file().phantoms, &told.phantoms)? else {
+    let picture = seen.picture(&finder);
+    let newer = || seen.refresh(&mut finder).then(|| finder.mean());
+    let Some(phantoms) = trace::trace(&picture, size, [&seen.file().phantoms, &told.phantoms], newer)? else {
         eprintln!("ended without saving; nothing is written");
         return Ok(Outcome::Done);
     };
     let found = FoundOutlines { phantoms, ..FoundOutlines::default() };
-    ended(arguments, seen, finder, Answer { found, notes: Vec::new(), is_cut })
+    ended(arguments, seen, &finder, Answer { found, notes: Vec::new(), is_cut })
 }
 
 /// Outlines, and what there is to say about them.
@@ -90,7 +108,7 @@ struct Answer {
 /// Tells the outlines, shows them and writes them. None at all are only written where somebody left all of them out.
 fn ended(
     arguments: &CalibratePhantom,
-    seen: Seen,
+    seen: &Seen,
     finder: &OutlineFinder,
     Answer { found, mut notes, is_cut }: Answer,
 ) -> Result<Outcome> {
@@ -113,9 +131,9 @@ fn ended(
     if found.phantoms.is_empty() && !arguments.trace {
         return Ok(Outcome::Failed);
     }
-    let mut file = seen.into_file();
-    file.phantoms = found.phantoms;
-    write(file, today()?, &arguments.files)?;
+    let files = if arguments.live { live::files(arguments)? } else { arguments.files.clone() };
+    let file = CalibrationFile { phantoms: found.phantoms, ..seen.file().clone() };
+    write(file, today()?, &files)?;
     Ok(Outcome::Done)
 }
 

@@ -1,4 +1,4 @@
-//! What outlines are traced on: a recording, a picture, or nothing but the calibration.
+//! What outlines are traced on: a recording, the camera, a picture, or nothing but the calibration.
 
 use std::path::Path;
 
@@ -6,15 +6,21 @@ use anyhow::{Context, Result, bail};
 use bowwave_calibration::{CalibrationFile, outline::OutlineFinder};
 use bowwave_core::event::Event;
 
-use super::super::{
-    input::{OpenedRecording, open},
-    pictures::read_picture,
+use super::{
+    super::{
+        input::{OpenedRecording, open},
+        pictures::read_picture,
+    },
+    live::LiveCamera,
 };
+use crate::cli::CalibratePhantom;
 
 /// What the gun is seen in, with the calibration that goes with it.
 pub enum Seen {
     /// Pictures in which the gun turns.
     Recording(Box<OpenedRecording>),
+    /// The camera's pictures as they come.
+    Live(Box<LiveCamera>),
     /// One picture: codes, rows from the top.
     Picture(Box<CalibrationFile>, Vec<u8>),
     /// None: outlines are known without one.
@@ -22,8 +28,16 @@ pub enum Seen {
 }
 
 impl Seen {
+    /// Opens what the arguments name.
+    pub fn open(arguments: &CalibratePhantom) -> Result<Self> {
+        if arguments.live {
+            return Ok(Self::Live(Box::new(LiveCamera::open(arguments)?)));
+        }
+        Self::open_file(arguments.recording.as_deref(), arguments.files.calibration.as_deref())
+    }
+
     /// Opens a recording or a picture.
-    pub fn open(path: Option<&Path>, calibration: Option<&Path>) -> Result<Self> {
+    fn open_file(path: Option<&Path>, calibration: Option<&Path>) -> Result<Self> {
         let named = || {
             let said = "name the calibration with --calibration: the lens decides where the gun is seen";
             CalibrationFile::read(calibration.context(said)?).map_err(anyhow::Error::from)
@@ -54,26 +68,36 @@ impl Seen {
     pub fn file(&self) -> &CalibrationFile {
         match self {
             Self::Recording(opened) => &opened.file,
+            Self::Live(camera) => camera.file(),
             Self::Picture(file, _) | Self::Nothing(file) => file,
         }
     }
 
-    /// The calibration, to be changed.
-    pub fn into_file(self) -> CalibrationFile {
+    /// Closes the camera, where there is one.
+    pub fn close(self) -> Result<()> {
         match self {
-            Self::Recording(opened) => opened.file,
-            Self::Picture(file, _) | Self::Nothing(file) => *file,
+            Self::Live(camera) => Ok(camera.close()?),
+            Self::Recording(_) | Self::Picture(..) | Self::Nothing(_) => Ok(()),
         }
     }
 
-    /// Shows a recording's pictures to the finder; tells whether it was cut short.
+    /// Shows the pictures of a recording or of the camera to the finder; tells whether a recording was cut short.
     pub fn show(&self, finder: &mut OutlineFinder) -> Result<bool> {
-        let Self::Recording(opened) = self else { return Ok(false) };
+        let opened = match self {
+            Self::Recording(opened) => opened,
+            Self::Live(camera) => return camera.show(finder).map(|()| false),
+            Self::Picture(..) | Self::Nothing(_) => return Ok(false),
+        };
         opened.play(true, |event| {
             if let Event::Frame(frame) = event {
                 finder.see(&frame.picture);
             }
         })
+    }
+
+    /// Shows the camera's pictures that came meanwhile to the finder; tells whether there is a new picture to trace on.
+    pub fn refresh(&self, finder: &mut OutlineFinder) -> bool {
+        matches!(self, Self::Live(camera) if camera.refresh(finder))
     }
 
     /// The picture that outlines are drawn on: the mean of those that `finder` saw, the one picture, or black.

@@ -40,13 +40,23 @@ pub struct Sheet {
 impl Sheet {
     /// Over a grey picture of `size` pixels.
     pub fn new(codes: &[u8], size: (u32, u32)) -> Result<Self> {
-        let grey =
-            |i: usize| u32::from_be_bytes([0, codes_at(codes, i), codes_at(codes, i), codes_at(codes, i)]);
         let letters = Lettering::new(LINE_PX as f32 * 0.8).context("cannot write in the window")?;
-        let picture: Vec<u32> = (0..size.0 as usize * size.1 as usize).map(grey).collect();
-        let mut words = picture.clone();
-        words.resize(size.0 as usize * Self::height(size), PAPER);
-        Ok(Self { picture, picture_size: IVec2::new(size.0 as i32, size.1 as i32), letters, words })
+        let mut sheet = Self {
+            picture: vec![0; size.0 as usize * size.1 as usize],
+            picture_size: IVec2::new(size.0 as i32, size.1 as i32),
+            letters,
+            words: vec![PAPER; size.0 as usize * Self::height(size)],
+        };
+        sheet.show(codes);
+        Ok(sheet)
+    }
+
+    /// Takes another picture of the same size; what codes do not reach is black.
+    pub fn show(&mut self, codes: &[u8]) {
+        let codes = codes.iter().copied().chain(std::iter::repeat(0));
+        for (word, code) in self.picture.iter_mut().zip(codes) {
+            *word = u32::from_be_bytes([0, code, code, code]);
+        }
     }
 
     /// Height with the lines below the picture, pixels.
@@ -165,7 +175,7 @@ impl Sheet {
                 part.phantom.name,
                 match part.origin {
                     Origin::Calibrated => "of the calibration",
-                    Origin::Found => "told by the recording",
+                    Origin::Found => "told by the pictures",
                     Origin::Traced => "traced",
                 },
                 if part.is_kept { "kept" } else { "left out" },
@@ -188,10 +198,6 @@ impl Sheet {
             });
         }
     }
-}
-
-fn codes_at(codes: &[u8], i: usize) -> u8 {
-    codes.get(i).copied().unwrap_or(0)
 }
 
 /// One colour laid over another by a cover of 0 to 255.
@@ -225,6 +231,8 @@ mod tests {
         let side = ((2 * LOUPE_PX + 1) * LOUPE_SCALE) as usize;
         let (x, y) = (640 - LOUPE_EDGE as usize - side / 2, LOUPE_EDGE as usize + side / 2);
         assert_eq!(at(x, y), OPEN);
+        sheet.show(&vec![120; 640 * 360]);
+        assert_eq!(sheet.draw(&editor)[200 * 640 + 20], 0x78_78_78);
         let ink = words[640 * 360..].iter().filter(|word| **word == INK).count();
         assert!(ink > 500, "{ink}");
         // Small pictures have no loupe, and any cursor is drawn.

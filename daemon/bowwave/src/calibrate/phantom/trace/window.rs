@@ -32,8 +32,13 @@ const KEYS: [(Key, Gesture); 9] = [
 const BUTTONS: [(MouseButton, Gesture); 2] =
     [(MouseButton::Left, Gesture::Corner), (MouseButton::Right, Gesture::Back)];
 
-/// Shows the picture until somebody ends it.
-pub fn trace(mut editor: Editor, codes: &[u8], size: (u32, u32)) -> Result<End> {
+/// Shows the picture, and those that come after it, until somebody ends it.
+pub fn trace(
+    mut editor: Editor,
+    codes: &[u8],
+    size: (u32, u32),
+    mut newer: impl FnMut() -> Option<Vec<u8>>,
+) -> Result<End> {
     let mut sheet = Sheet::new(codes, size)?;
     let (width, height) = (size.0 as usize, Sheet::height(size));
     let shrunk = (SIDE_MOST / width.max(height) as f64).min(1.0);
@@ -53,6 +58,9 @@ pub fn trace(mut editor: Editor, codes: &[u8], size: (u32, u32)) -> Result<End> 
         }
         if let Some(end) = editor.end() {
             return Ok(end.clone());
+        }
+        if let Some(codes) = newer() {
+            sheet.show(&codes);
         }
         window
             .update_with_buffer(sheet.draw(&editor), width, height)
