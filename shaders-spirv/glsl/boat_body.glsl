@@ -17,9 +17,10 @@ layout(location = 7) in vec4 thrown;
 // Whether there may be a searchlight, flares, fires.
 layout(constant_id = 2) const bool LAMPLIGHT = false;
 
-// Light that the corner sends to the eye: of sky and sea, with haze, and of the sun, if nothing is before it. A texture's colours and the
-// haze come later. Both are found here and not at every pixel: matt light varies little over the triangles of a boat, and small triangles
-// cost by the fragment and by what is handed to it. In the sea's mirror nobody sees a shadow: its light is one colour.
+// Light that the corner sends to the eye: of sky and sea, with haze, and of the sun, if nothing is before it; below nothing where it faces
+// away. A texture's colours and the haze come later. Both are found here and not at every pixel: matt light varies little over the triangles
+// of a boat, and small triangles cost by the fragment and by what is handed to it. In the sea's mirror nobody sees a shadow: its light is
+// one colour.
 layout(location = 0) out vec3 around_out;
 #ifdef MIRRORED
 const uint UV = 1;
@@ -79,9 +80,9 @@ void main() {
     if (LAMPLIGHT) {
         around_out += lit_by_searchlight(boat, in_camera) + lit_by_lamps(boat);
     }
-    vec3 sun = albedo * frame.sun.rgb * max(dot(normal, boat.sun.xyz), 0.0);
+    vec3 sun = albedo * frame.sun.rgb * dot(normal, boat.sun.xyz);
 #ifdef MIRRORED
-    around_out += sun;
+    around_out += max(sun, 0.0);
 #else
     sun_out = sun;
     // A little off the surface, so that it does not shade itself by the map's texels.

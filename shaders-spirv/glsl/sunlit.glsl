@@ -18,7 +18,9 @@ float sun_share(vec3 place) {
     return mix(mix(lit.w, lit.z, share.x), mix(lit.x, lit.y, share.x), share.y);
 }
 
-// Of the light that the sun sends without shadow, what arrives at `place`.
+// Of the light that the sun sends without shadow, what arrives at `place`. It is below nothing on what faces away: corners on either side of
+// where the sun grazes a triangle then say where that is.
 vec3 sunlit(vec3 sun, vec3 place) {
+    sun = max(sun, 0.0);
     return place.z > UNSHADED || sun.g == 0.0 ? sun : sun * sun_share(place);
 }

@@ -30,6 +30,8 @@ struct Mesh {
     first_index: u32,
     first_vertex: i32,
     levels: Vec<Level>,
+    /// Levels of its shape alone.
+    casters: Vec<Level>,
     /// Set 1, where the model has a texture.
     skin: Option<vk::DescriptorSet>,
     _texture: Option<Image>,
@@ -78,6 +80,7 @@ impl Meshes {
                 first_index: u32::try_from(indices.len()).map_err(too_big)?,
                 first_vertex: i32::try_from(vertices.len()).map_err(too_big)?,
                 levels: made.levels,
+                casters: made.casters,
                 skin,
                 _texture: texture,
             });
@@ -107,15 +110,23 @@ impl Meshes {
 
     /// The coarsest level of a model that lies within `detail_m` of the whole.
     pub(crate) fn level(&self, model: ModelId, detail_m: f64) -> Option<&Level> {
-        let levels = &self.meshes.get(usize::from(model.0))?.levels;
-        levels.iter().rev().find(|l| l.error_m() <= detail_m).or_else(|| levels.first())
+        coarsest(&self.meshes.get(usize::from(model.0))?.levels, detail_m)
+    }
+
+    /// The same of a model's shape alone: what throws its shadow.
+    pub(crate) fn caster(&self, model: ModelId, detail_m: f64) -> Option<&Level> {
+        coarsest(&self.meshes.get(usize::from(model.0))?.casters, detail_m)
     }
 
     /// By how many times the detail of boats is coarser than what each gives, so that all have at most [`TRIANGLES_MAX`] triangles; at most
-    /// [`COARSER_MAX`].
-    pub(crate) fn coarser(&self, draws: impl Iterator<Item = (ModelId, f64)> + Clone) -> f64 {
+    /// [`COARSER_MAX`]. `level` is [`Self::level`] or [`Self::caster`].
+    pub(crate) fn coarser<'a>(
+        &'a self,
+        level: impl Fn(&'a Self, ModelId, f64) -> Option<&'a Level>,
+        draws: impl Iterator<Item = (ModelId, f64)> + Clone,
+    ) -> f64 {
         coarser(|factor| {
-            let levels = draws.clone().filter_map(|(model, detail_m)| self.level(model, factor * detail_m));
+            let levels = draws.clone().filter_map(|(model, detail_m)| level(self, model, factor * detail_m));
             levels.map(|level| (level.open.end - level.closed.start) / 3).sum()
         })
     }
@@ -127,6 +138,11 @@ impl Meshes {
         // SAFETY: within a rendering, with buffers and pipeline bound; the ranges were checked when the model was taken.
         unsafe { to.gpu.device.cmd_draw_indexed(to.cmd, count, 1, first, mesh.first_vertex, 0) };
     }
+}
+
+/// The coarsest of `levels` that lies within `detail_m` of the whole.
+fn coarsest(levels: &[Level], detail_m: f64) -> Option<&Level> {
+    levels.iter().rev().find(|l| l.error_m() <= detail_m).or_else(|| levels.first())
 }
 
 /// The same by how many triangles there are at a factor.

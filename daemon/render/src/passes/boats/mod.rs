@@ -1,6 +1,7 @@
 //! The boats: meshes into a multisampled layer of their own, within the rectangles that their hulls can cover, then the mean of
 //! each pixel's samples over the video in linear light.
 
+mod casters;
 pub(crate) mod coverage;
 pub(crate) mod meshes;
 mod parts;
@@ -209,7 +210,7 @@ impl BoatsPass {
         to.clear([vk::ImageAspectFlags::COLOR, vk::ImageAspectFlags::DEPTH], clears);
         to.clear([vk::ImageAspectFlags::DEPTH], depth_clears);
         meshes.bind(to);
-        let coarser = meshes.coarser(boats.iter().map(|boat| (boat.model, boat.detail_m)));
+        let coarser = meshes.coarser(Meshes::level, boats.iter().map(|boat| (boat.model, boat.detail_m)));
         for boat in boats {
             to.scissor(boat.rect);
             self.pipelines.draw(to, frame, (meshes, coarser), boat);

@@ -5,10 +5,12 @@
 use std::{collections::HashMap, ops::Range};
 
 use bowwave_core::model::{Model, ModelKind, Vertex};
+use bytemuck::Zeroable as _;
 use meshopt::{SimplifyOptions, VertexDataAdapter, simplify_with_attributes_and_locks};
 use shaders_spirv::interface::MeshVertex;
 
 use crate::{
+    passes::boats::casters::casters,
     passes::boats::parts::Parts,
     passes::boats::split::{EDGE_PX, split},
     passes::boats::transfer::{BakedLight, CornerLight, SEA, baked_light},
@@ -30,7 +32,7 @@ const ALBEDO_WEIGHT: f32 = 6.0;
 /// a part of the rest.
 const LIGHT_M: f32 = 0.8;
 /// Up to this error, metres, levels are made of the finer surface that holds light; farther off the model's own triangles hold enough.
-const FINE_M: f32 = 0.04;
+const FINE_M: f32 = 0.02;
 const LIGHT_TERMS: [(usize, f32); 4] = [(0, 1.0), (1, 0.4), (2, 0.4), (SEA, 0.4)];
 
 /// Up to this error, metres, triangles on either side of an edge between two colours or of a sharp edge stay apart: stripes and gunwales are pixels wide
@@ -49,6 +51,23 @@ pub(crate) struct Level {
 }
 
 impl Level {
+    /// Adds the triangles of closed parts and of open shells to `indices`.
+    fn of(
+        error_m: f32,
+        indices: &mut Vec<u32>,
+        (closed, open): (impl Iterator<Item = [u32; 3]>, impl Iterator<Item = [u32; 3]>),
+    ) -> Self {
+        let from = indices.len() as u32;
+        indices.extend(closed.flatten());
+        let between = indices.len() as u32;
+        indices.extend(open.flatten());
+        Self {
+            error_tenth_mm: (error_m * 1e4).round() as u32,
+            closed: from..between,
+            open: between..indices.len() as u32,
+        }
+    }
+
     /// How far the surface is from the model's, metres.
     pub(crate) fn error_m(&self) -> f64 {
         f64::from(self.error_tenth_mm) * 1e-4
@@ -62,6 +81,8 @@ pub(crate) struct Simplified {
     pub(crate) indices: Vec<u32>,
     /// From the finest to the coarsest; never empty.
     pub(crate) levels: Vec<Level>,
+    /// The same of the shape alone, which throws shadows; never empty.
+    pub(crate) casters: Vec<Level>,
     /// Long edges are cut.
     bent: bool,
     /// Largest extent of the model, metres.
@@ -90,13 +111,14 @@ pub(crate) fn simplify(model: &Model, bent: bool) -> Simplified {
         all.push(error, triangles, &closed, Corners::new(surface, corners));
     };
     // A texture's seams would tear, and a picture has few triangles anyway.
-    if model.texture.is_some() || model.kind == ModelKind::Quad {
-        push(0.0, &triangles(&surface.indices), &light.corners);
-        return all;
-    }
-    let whole = triangles(&with_error(&light, model, &parts, ERROR_WHOLE_M));
+    let whole = if model.texture.is_some() || model.kind == ModelKind::Quad {
+        Vec::new()
+    } else {
+        triangles(&with_error(&light, model, &parts, ERROR_WHOLE_M))
+    };
     if whole.is_empty() {
         push(0.0, &triangles(&surface.indices), &light.corners);
+        all.casters = all.levels.clone();
         return all;
     }
     let mut last = whole.len();
@@ -110,10 +132,12 @@ pub(crate) fn simplify(model: &Model, bent: bool) -> Simplified {
         }
         error *= 2.0;
     }
+    all.push_casters(model);
     all
 }
 
-fn triangles(indices: &[u32]) -> Vec<[u32; 3]> {
+/// Indices by triangles.
+pub(super) fn triangles(indices: &[u32]) -> Vec<[u32; 3]> {
     indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
 }
 
@@ -222,14 +246,33 @@ impl Simplified {
         if self.bent {
             triangles = split(&mut self.vertices, triangles, EDGE_PX * least_pixel_m(error_m, self.size_m));
         }
-        let mut run = |wanted: bool| {
-            let from = self.indices.len() as u32;
-            let chosen = triangles.iter().filter(|(_, closed)| *closed == wanted);
-            self.indices.extend(chosen.flat_map(|(t, _)| t));
-            from..self.indices.len() as u32
+        let of =
+            |wanted: bool| triangles.iter().filter(move |(_, closed)| *closed == wanted).map(|(t, _)| *t);
+        let level = Level::of(error_m, &mut self.indices, (of(true), of(false)));
+        self.levels.push(level);
+    }
+
+    /// Adds the levels of the shape alone, with corners of their own, of which nothing but the place is looked at. Rays of the sun are straight
+    /// in any lens.
+    fn push_casters(&mut self, model: &Model) {
+        let mut drawn: HashMap<u32, u32> = HashMap::new();
+        let vertices = &mut self.vertices;
+        let mut corner = |i: u32| {
+            *drawn.entry(i).or_insert_with(|| {
+                let position = model.vertices[i as usize].position.to_array();
+                vertices.push(MeshVertex { position, ..MeshVertex::zeroed() });
+                vertices.len() as u32 - 1
+            })
         };
-        let (closed, open) = (run(true), run(false));
-        self.levels.push(Level { error_tenth_mm: (error_m * 1e4).round() as u32, closed, open });
+        for caster in casters(model) {
+            let [closed, open] = [caster.closed, caster.open]
+                .map(|triangles| triangles.into_iter().map(|t| t.map(&mut corner)).collect::<Vec<_>>());
+            let triangles = (closed.into_iter(), open.into_iter());
+            self.casters.push(Level::of(caster.error_m, &mut self.indices, triangles));
+        }
+        if self.casters.is_empty() {
+            self.casters.clone_from(&self.levels);
+        }
     }
 }
 

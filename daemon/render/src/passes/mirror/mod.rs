@@ -154,7 +154,7 @@ impl MirrorPass {
         let Some(area) = places.iter().map(|p| p.place).reduce(joined) else { return };
         to.begin(area, Colour::new(self.colour.view, Begin::Zero), Some((self.depth.view, Begin::Zero)));
         meshes.bind(to);
-        let coarser = meshes.coarser(boats.iter().map(|boat| (boat.model, boat.detail_m)));
+        let coarser = meshes.coarser(Meshes::level, boats.iter().map(|boat| (boat.model, boat.detail_m)));
         for (boat, placed) in boats.iter().zip(places) {
             to.window(placed.viewport(self.size), placed.place);
             self.pipelines.draw(to, frame, (meshes, coarser), boat);

@@ -64,9 +64,10 @@ impl ShadowPass {
         to.clear([vk::ImageAspectFlags::DEPTH], &plan.clears);
         meshes.bind(to);
         to.bind(&self.pipeline, &[]);
-        let coarser = meshes.coarser(plan.draws.iter().map(|draw| (draw.model, draw.detail_m)));
+        let coarser =
+            meshes.coarser(Meshes::caster, plan.draws.iter().map(|draw| (draw.model, draw.detail_m)));
         for draw in &plan.draws {
-            let Some(level) = meshes.level(draw.model, coarser * draw.detail_m) else { continue };
+            let Some(level) = meshes.caster(draw.model, coarser * draw.detail_m) else { continue };
             to.scissor(draw.place);
             to.push(&self.pipeline, &draw.block);
             meshes.draw(to, draw.model, &(level.closed.start..level.open.end));

@@ -21,15 +21,17 @@ use crate::{
 pub(super) const MAP: (u32, u32) = (1024, 1024);
 /// Texels of a place for a pixel of the screen, each way.
 const TEXELS_A_PIXEL: f64 = 1.0;
-/// Most texels of a place, each way: those of a near boat are larger.
+/// Texels of a place along its longer side: those of a near boat are larger than a pixel, those of a far one smaller. A boat of a few pixels
+/// costs by its triangles and not by its texels.
+const PLACE_MIN: f64 = 96.0;
 const PLACE_MAX: f64 = 256.0;
 /// Most nearness to the sun, metres above the lowest place of a boat: what is further up its light shades nothing.
 const DEPTH_M: f64 = 4096.0;
 /// A surface is looked up so far off itself, texels. Closed hulls need nothing, since the map holds their far sides; both sides of an open
-/// shell lie in the same place.
-const OFF_TEXELS: f64 = 0.5;
-/// Boats are drawn simplified by no more than this, texels.
-const DETAIL_TEXELS: f64 = 1.0;
+/// shell lie in the same place. Farther off, what a gunwale shades would stand out of its shadow.
+const OFF_TEXELS: f64 = 0.2;
+/// Boats are drawn simplified by no more than this, texels: a gunwale's shadow is about one wide.
+const DETAIL_TEXELS: f64 = 0.5;
 /// Boats that are drawn for one that may be shaded, itself included, on the average over all.
 const CASTERS_MAX: usize = 4;
 
@@ -88,9 +90,10 @@ impl SunView {
         apart.x < 0.0 && apart.y < 0.0 && middle.z + half.z > self.low.z
     }
 
-    /// Texels that are wanted: one for `pixel_m`.
+    /// Texels that are wanted: one for `pixel_m`, within the bounds of a place.
     fn texels(&self, pixel_m: f64) -> PixelRect {
-        let texel_m = (pixel_m / TEXELS_A_PIXEL).max(self.size.x.max(self.size.y) / PLACE_MAX).max(1e-4);
+        let long = self.size.x.max(self.size.y);
+        let texel_m = (pixel_m / TEXELS_A_PIXEL).min(long / PLACE_MIN).max(long / PLACE_MAX).max(1e-4);
         let count = |m: f64| (m / texel_m).ceil().max(1.0) as u32;
         PixelRect { x: 0, y: 0, width: count(self.size.x), height: count(self.size.y) }
     }

@@ -21,7 +21,7 @@ pub const ABOUT: About = About {
             over skiff, RHIB, dhow and, five times as far, frigate at 60, 150 and 400 m",
     rivals: "the product's picture without shadows, and with a sky that is even; the sun without shadows and an even light that reaches all (Lambert and \
              ambient). Below that, what is left where one part of the product's light is replaced by the truth's",
-    why: "what each corner gets of sky, sea and the other faces is found once, and a map a boat hides the sun: what is left is one look-up of it a pixel, and edges",
+    why: "what each corner gets of sky, sea and the other faces is found once, and a map a boat hides the sun: what is left are triangles that simplification left out, thin shadows, and edges",
 };
 
 const BOATS: [(&str, f64); 4] = [("skiff", 1.0), ("rhib", 1.0), ("dhow", 1.0), ("frigate", 5.0)];
