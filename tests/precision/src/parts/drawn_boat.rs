@@ -6,26 +6,31 @@ use anyhow::{Context as _, Result};
 use bowwave_core::{
     estimate::light::{Light, SeaTones},
     event::Picture,
-    frame::scene::{LeftOut, Pass, PassDecision, Scene},
-    geometry::Lens,
-    model::Model,
+    frame::scene::{BoatView, LeftOut, Pass, PassDecision, Scene},
+    geometry::{Lens, RigidPose},
+    model::{Model, ModelId},
     sea::BeaufortForce,
     water::ReflectionMethod,
 };
 use bowwave_models::resolve;
 use bowwave_render::SOFTWARE;
-use glam::DVec3;
+use glam::{DQuat, DVec3, Vec3};
 use image::RgbImage;
 
-use crate::reflection::{
-    draw::{Painter, picture},
-    scenes::{self, Afloats},
+use crate::{
+    reflection::{
+        draw::{Painter, picture},
+        scenes::{self, Afloats},
+    },
+    truth::boat::block,
 };
 
 /// The picture, pixels.
 pub(super) const SIZE: (u32, u32) = (1280, 720);
 /// Width of the view, degrees.
 const HFOV_DEG: f64 = 40.0;
+/// Sides of what stands before the sun where a boat is to be in the shade, metres.
+const BLOCK_M: f32 = 400.0;
 /// Height of the eye, metres.
 pub(super) const EYE_M: f64 = 8.0;
 
@@ -42,7 +47,10 @@ impl DrawnBoat {
         let mut model = resolve(name, std::path::Path::new(""))?;
         // Rays do not look at textures.
         model.texture = None;
-        let painter = Painter::new(SIZE, std::slice::from_ref(&model), &[], (1, Some(SOFTWARE)))?;
+        let half = Vec3::splat(BLOCK_M / 2.0);
+        let models = [model, block(-half, half, Vec3::ZERO)];
+        let painter = Painter::new(SIZE, &models, &[], (models.len(), Some(SOFTWARE)))?;
+        let [model, _] = models;
         Ok(Self { model, painter: RefCell::new(painter), black: picture(&RgbImage::new(SIZE.0, SIZE.1))? })
     }
 
@@ -85,9 +93,57 @@ pub(super) fn without_shadow(scene: &Scene) -> Scene {
     scene
 }
 
+/// The scene with a block between the boat and the sun that is not in the picture. So all of the sun's disc is hidden; what comes of the sun by way
+/// of the hull is still there, as the product has it.
+pub(super) fn in_shade(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    if let Some(boat) = scene.boats.first().cloned() {
+        let away = scene.light.sun_direction * f64::from(2.0 * BLOCK_M);
+        let pose = RigidPose { world_from_body: DQuat::IDENTITY, position: boat.pose.position + away };
+        scene.boats.push(BoatView { model: ModelId(1), pose, hull: None, wake: None, ..boat });
+    }
+    scene
+}
+
 /// A direction by elevation and azimuth clockwise from ahead, degrees.
 pub(super) fn towards(elevation_deg: f64, azimuth_deg: f64) -> DVec3 {
     let (up, level) = elevation_deg.to_radians().sin_cos();
     let (right, ahead) = azimuth_deg.to_radians().sin_cos();
     DVec3::new(level * right, level * ahead, up)
+}
+
+#[cfg(test)]
+mod tests {
+    use bowwave_core::sky::SkyLobes;
+
+    use super::*;
+
+    #[test]
+    fn a_boat_in_the_shade_has_no_sun_but_what_its_hull_throws() {
+        let drawn = DrawnBoat::new("skiff").unwrap();
+        let sky = Vec3::splat(0.1);
+        for sun_direction in [towards(3.0, 100.0), towards(40.0, 200.0), DVec3::Z] {
+            let light = Light {
+                sun_direction,
+                sun: Vec3::splat(0.7),
+                sky,
+                dome: SkyLobes::even(sky),
+                horizon: sky,
+                sea: 0.2 * sky,
+            };
+            let scene = drawn.scene(60.0, afloat(60.0, 70.0), light).unwrap();
+            let sunless = Scene { light: Light { sun: Vec3::ZERO, ..light }, ..without_shadow(&scene) };
+            let [lit, shaded, sunless] =
+                [&without_shadow(&scene), &in_shade(&scene), &sunless].map(|s| drawn.paint(s).unwrap());
+            let codes = |picture: &RgbImage| picture.pixels().map(|p| u64::from(p.0[1])).sum::<u64>();
+            let between = sunless.pixels().zip(shaded.pixels()).zip(lit.pixels());
+            let off = between.filter(|((low, at), high)| at.0[1] + 3 < low.0[1] || at.0[1] > high.0[1] + 3);
+            // A pixel of an edge has its middle beyond the triangle, where the light of its corners is drawn on.
+            let off = off.count();
+            assert!(off <= 2, "{off} pixels");
+            // The hull throws less than half of what the sun brings.
+            let (low, at, high) = (codes(&sunless), codes(&shaded), codes(&lit));
+            assert!(low < at && 2 * (at - low) < high - low, "{low} {at} {high}");
+        }
+    }
 }

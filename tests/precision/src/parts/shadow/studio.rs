@@ -13,7 +13,7 @@ use image::{Rgb, RgbImage};
 
 use crate::{
     metric::Cutout,
-    parts::drawn_boat::{self, DrawnBoat, EYE_M, SIZE, without_shadow},
+    parts::drawn_boat::{self, DrawnBoat, EYE_M, SIZE, in_shade, without_shadow},
     reflection::scenes::Afloats,
     shadows::{
         NamedMethod, ShadowEye, ShadowFrame,
@@ -162,7 +162,7 @@ impl Studio {
         let scene = self.scene(case)?;
         let staged = self.stage(case, &scene, more)?;
         let bare = without_shadow(&scene);
-        let around = Scene { light: Light { sun: Vec3::ZERO, ..bare.light }, ..bare.clone() };
+        let around = in_shade(&scene);
         let seen = &staged.seen[0];
         let cutout = Cutout::new(seen.corner, seen.size, [SIZE.0, SIZE.1]);
         let paint = |scene: &Scene| Ok::<_, anyhow::Error>(cutout.cut(&self.paint(scene)?));
