@@ -1,7 +1,8 @@
 //! Arguments of the tasks of `calibrate` that are about how camera, inertial unit and gun are mounted on each other.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use anyhow::{Context as _, Result};
 use bowwave_calibration::target::Target;
 use clap::{Args, FromArgMatches as _, ValueEnum};
 use glam::DVec2;
@@ -28,6 +29,16 @@ pub struct CalibrationFiles {
     /// Calibration file to write; without it the one of --calibration. What stands there is kept, see `restore`
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+}
+
+impl CalibrationFiles {
+    /// The calibration to begin with on live devices: the one that is named, else the one of the configuration `config`.
+    pub fn named_or(&self, configured: Option<&Path>, config: &Path) -> Result<PathBuf> {
+        let named = self.calibration.as_deref().or(configured);
+        named.map(Path::to_owned).with_context(|| {
+            format!("{} names no calibration: set files.calibration, or say --calibration", config.display())
+        })
+    }
 }
 
 /// Arguments that say how a recording is looked at, and how the result is shown.

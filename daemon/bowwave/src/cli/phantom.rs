@@ -25,7 +25,7 @@ pub struct CalibratePhantom {
     /// Configuration (TOML) that names camera and calibration, with --live
     #[arg(long, value_name = "FILE", default_value = CONFIG, requires = "live", conflicts_with_all = ["recording", "outline", "model"])]
     pub config: PathBuf,
-    /// How long pictures are taken, with --live; without it 30, or 3 to trace
+    /// Seconds of pictures to take with --live; without it 30, or 3 to trace
     #[arg(long, value_name = "SECONDS", requires = "live", value_parser = clap::value_parser!(u32).range(1..=600))]
     pub seconds: Option<u32>,
     /// Trace a part by hand instead: its corners in pixels in order, once for each part; parts that touch must overlap

@@ -18,7 +18,7 @@ use crate::{
     run::settings::camera_of,
 };
 
-/// How long pictures are taken, seconds: before somebody traces, and to find what keeps still while the gun turns.
+/// Seconds of pictures: before somebody traces, and to find what keeps still while the gun turns.
 const TRACED_S: u32 = 3;
 const FOUND_S: u32 = 30;
 /// Pause between two looks at the camera's queue.
@@ -29,29 +29,15 @@ pub struct LiveCamera {
     port: CameraPort,
     reports: Reports,
     file: CalibrationFile,
+    path: PathBuf,
     seconds: u32,
-}
-
-/// Where the calibration lies: the one that is named, or the configuration's.
-pub fn files(arguments: &CalibratePhantom) -> Result<CalibrationFiles> {
-    let named = arguments.files.calibration.clone();
-    let calibration = match named {
-        Some(named) => named,
-        None => config::read(&arguments.config)?.files.calibration.with_context(|| {
-            format!(
-                "{} names no calibration, and the lens decides where the gun is seen: set files.calibration, or say --calibration",
-                arguments.config.display()
-            )
-        })?,
-    };
-    Ok(CalibrationFiles { calibration: Some(calibration), out: arguments.files.out.clone() })
 }
 
 impl LiveCamera {
     /// Starts the camera that the configuration names, in the calibrated size.
     pub fn open(arguments: &CalibratePhantom) -> Result<Self> {
         let config = config::read(&arguments.config)?;
-        let path: PathBuf = files(arguments)?.calibration.unwrap_or_default();
+        let path = arguments.files.named_or(config.files.calibration.as_deref(), &arguments.config)?;
         let file = CalibrationFile::read(&path).with_context(|| {
             format!(
                 "{} must be a calibration of this camera's lens; begin with bowwave calibrate wizard",
@@ -63,12 +49,17 @@ impl LiveCamera {
         let (reporter, reports) = reporting();
         let port = CameraPort::start(settings, reporter)?;
         let usual = if arguments.trace { TRACED_S } else { FOUND_S };
-        Ok(Self { port, reports, file, seconds: arguments.seconds.unwrap_or(usual) })
+        Ok(Self { port, reports, file, path, seconds: arguments.seconds.unwrap_or(usual) })
     }
 
     /// The calibration.
     pub const fn file(&self) -> &CalibrationFile {
         &self.file
+    }
+
+    /// The file of that calibration, and the one to write.
+    pub fn files(&self, named: &CalibrationFiles) -> CalibrationFiles {
+        CalibrationFiles { calibration: Some(self.path.clone()), out: named.out.clone() }
     }
 
     /// Shows the camera's pictures to the finder for the time that was asked for, from the first one on.

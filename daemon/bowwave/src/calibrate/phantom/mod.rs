@@ -131,7 +131,10 @@ fn ended(
     if found.phantoms.is_empty() && !arguments.trace {
         return Ok(Outcome::Failed);
     }
-    let files = if arguments.live { live::files(arguments)? } else { arguments.files.clone() };
+    let files = match seen {
+        Seen::Live(camera) => camera.files(&arguments.files),
+        _ => arguments.files.clone(),
+    };
     let file = CalibrationFile { phantoms: found.phantoms, ..seen.file().clone() };
     write(file, today()?, &files)?;
     Ok(Outcome::Done)

@@ -1,4 +1,4 @@
-//! What outlines are traced on: a recording, the camera, a picture, or nothing but the calibration.
+//! Sources of outlines: a recording, the camera, a picture, or nothing but the calibration.
 
 use std::path::Path;
 

@@ -52,9 +52,7 @@ const PICTURES: usize = 4;
 pub fn run(arguments: &CalibrateWizard) -> Result<Outcome> {
     let reader = Reader::new(arguments.config.clone(), None);
     let mut settings = reader.read()?;
-    let named = arguments.files.calibration.clone().or_else(|| settings.config.files.calibration.clone());
-    let path = named
-        .context("nothing says where the calibration lies: set files.calibration in the configuration, or say --calibration")?;
+    let path = arguments.files.named_or(settings.config.files.calibration.as_deref(), &arguments.config)?;
     let file = if path.exists() {
         CalibrationFile::read(&path)?
     } else {

@@ -1,4 +1,4 @@
-//! What of a mesh throws a shadow: its shape alone. Levels that keep colours, light and sharp edges spend half of their triangles on those, and
+//! The shape of a mesh alone, which throws its shadow. Levels that keep colours, light and sharp edges spend half of their triangles on those, and
 //! a shadow map that shows a gunwale would pay for them.
 
 use std::collections::HashMap;
@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use bowwave_core::model::Model;
 use meshopt::{SimplifyOptions, VertexDataAdapter, simplify};
 
-use super::{parts::Parts, simplify::triangles};
+use super::parts::{Parts, spot, triangles};
 
 /// Error of the finest level, metres; each has twice the error of the one before.
 const ERROR_MIN_M: f32 = 0.004;
@@ -26,10 +26,11 @@ pub(super) struct Caster {
 pub(super) fn casters(model: &Model) -> Vec<Caster> {
     let parts = Parts::of(model);
     let indices = welded(model);
+    let positions: Vec<[f32; 3]> = model.vertices.iter().map(|v| v.position.to_array()).collect();
     let size_m = (model.max - model.min).max_element();
     let (mut levels, mut error_m) = (Vec::new(), ERROR_MIN_M);
     while error_m < size_m / 8.0 {
-        let made = with_error(model, &indices, error_m);
+        let made = with_error(&positions, &indices, error_m);
         if made.is_empty() {
             break;
         }
@@ -48,17 +49,16 @@ pub(super) fn casters(model: &Model) -> Vec<Caster> {
 /// The model's triangles with one corner for all that stand at the same place, so that no seam is left between them.
 fn welded(model: &Model) -> Vec<u32> {
     let mut first = HashMap::new();
-    let mut corner = |i: &u32| {
-        let at = model.vertices[*i as usize].position.to_array().map(f32::to_bits);
-        *first.entry(at).or_insert(*i)
-    };
-    model.indices.iter().map(&mut corner).collect()
+    model
+        .indices
+        .iter()
+        .map(|i| *first.entry(spot(model.vertices[*i as usize].position)).or_insert(*i))
+        .collect()
 }
 
 /// The triangles that keep the shape within `error_m` metres.
-fn with_error(model: &Model, indices: &[u32], error_m: f32) -> Vec<u32> {
-    let positions: Vec<[f32; 3]> = model.vertices.iter().map(|v| v.position.to_array()).collect();
-    let adapter = VertexDataAdapter::new(bytemuck::cast_slice(&positions), size_of::<[f32; 3]>(), 0);
+fn with_error(positions: &[[f32; 3]], indices: &[u32], error_m: f32) -> Vec<u32> {
+    let adapter = VertexDataAdapter::new(bytemuck::cast_slice(positions), size_of::<[f32; 3]>(), 0);
     let options = SimplifyOptions::ErrorAbsolute | SimplifyOptions::Prune | SimplifyOptions::Permissive;
     adapter.map_or_else(
         |_| Vec::new(),

@@ -3,12 +3,22 @@
 use std::collections::HashMap;
 
 use bowwave_core::model::Model;
-use glam::Vec3;
+use glam::{IVec3, Vec3};
 
 /// Corners closer than this are one corner of the shape, metres.
-const WELD_M: f32 = 1e-4;
+pub(crate) const WELD_M: f32 = 1e-4;
 /// What is shorter is no line.
 const LINE_LENGTH_M: f32 = 0.8;
+
+/// Indices by triangles.
+pub(crate) fn triangles(indices: &[u32]) -> Vec<[u32; 3]> {
+    indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
+}
+
+/// A place in steps of [`WELD_M`]: the same for corners that are one.
+pub(crate) fn spot(place: Vec3) -> IVec3 {
+    (place / WELD_M).round().as_ivec3()
+}
 
 /// The parts of a model: triangles that share corners.
 pub(crate) struct Parts {
@@ -24,13 +34,13 @@ impl Parts {
     /// Finds them; the model's indices lie within its vertices.
     pub(crate) fn of(model: &Model) -> Self {
         let vertices = &model.vertices;
-        let triangles: Vec<[u32; 3]> = model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+        let triangles = triangles(&model.indices);
         let mut ids = HashMap::new();
         let welded: Vec<u32> = vertices
             .iter()
             .map(|v| {
                 let next = ids.len() as u32;
-                *ids.entry((v.position / WELD_M).round().as_ivec3()).or_insert(next)
+                *ids.entry(spot(v.position)).or_insert(next)
             })
             .collect();
         let corners = |t: &[u32; 3]| t.map(|i| welded[i as usize]);

@@ -11,7 +11,7 @@ use shaders_spirv::interface::MeshVertex;
 
 use crate::{
     passes::boats::casters::casters,
-    passes::boats::parts::Parts,
+    passes::boats::parts::{Parts, triangles},
     passes::boats::split::{EDGE_PX, split},
     passes::boats::transfer::{BakedLight, CornerLight, SEA, baked_light},
     view::DETAIL_PX,
@@ -42,7 +42,7 @@ const SEAMS_M: f32 = 0.1;
 /// A model at one level of detail, as ranges of indices.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Level {
-    /// How far the surface is from the model's, tenths of millimetres; 0 for the whole, which is within [`ERROR_WHOLE_M`].
+    /// Distance of the surface from the model's, tenths of millimetres; 0 for the whole, which is within [`ERROR_WHOLE_M`].
     error_tenth_mm: u32,
     /// Triangles of closed parts: back faces can be left out.
     pub(crate) closed: Range<u32>,
@@ -68,7 +68,7 @@ impl Level {
         }
     }
 
-    /// How far the surface is from the model's, metres.
+    /// Distance of the surface from the model's, metres.
     pub(crate) fn error_m(&self) -> f64 {
         f64::from(self.error_tenth_mm) * 1e-4
     }
@@ -134,11 +134,6 @@ pub(crate) fn simplify(model: &Model, bent: bool) -> Simplified {
     }
     all.push_casters(model);
     all
-}
-
-/// Indices by triangles.
-pub(super) fn triangles(indices: &[u32]) -> Vec<[u32; 3]> {
-    indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
 }
 
 /// The corners of one level: those of open shells are seen and lit from both sides, and each side has its own.

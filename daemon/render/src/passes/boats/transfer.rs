@@ -165,7 +165,7 @@ mod tests {
     use glam::{DVec3, Vec3};
 
     use super::*;
-    use crate::testing;
+    use crate::{passes::boats::parts::triangles, testing};
 
     /// Radiance of a white corner under a sky that is 1 everywhere over a black sea, and over a sea that is 1 under a black sky.
     fn parts(t: &Transfer) -> (f32, f32) {
@@ -244,9 +244,7 @@ mod tests {
             model.vertices.iter_mut().for_each(|v| v.albedo = Vec3::ZERO);
             let seen = baked_light(&model);
             let at = |i: u32| &seen.surface.vertices[i as usize];
-            let faces_of = |of: &Model| {
-                of.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect::<Vec<[u32; 3]>>()
-            };
+            let faces_of = |of: &Model| triangles(&of.indices);
             let positions = |t: &[u32; 3]| t.map(|i| at(i).position.as_dvec3());
             let hulls: Vec<[DVec3; 3]> = faces_of(&model).iter().map(positions).collect();
             let faces = faces_of(&seen.surface);

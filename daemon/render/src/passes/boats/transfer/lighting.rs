@@ -20,7 +20,7 @@ const RAYS_MIN: usize = 16;
 /// Rays start so far off the surface, metres.
 const OFF_M: f32 = 0.004;
 
-/// What lights a boat's surface.
+/// The light about a boat, past it and by way of it.
 pub(super) struct Lighting {
     rays: Rays,
     /// Directions about a normal, as often as their cosines.

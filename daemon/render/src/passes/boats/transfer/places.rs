@@ -4,6 +4,7 @@ use bowwave_core::model::{Model, Vertex};
 use glam::Vec3;
 
 use super::{DARK, Transfer, fit::Seat};
+use crate::passes::boats::parts::triangles;
 
 /// A place on the surface: what it sees is seen about its triangle's corners by their shares.
 #[derive(Clone)]
@@ -74,7 +75,7 @@ pub(super) fn places(model: &Model) -> Vec<Place> {
     /// About so many on the whole, and at most so many on a triangle.
     const ALL: f32 = 6000.0;
     const MOST: f32 = 16.0;
-    let triangles: Vec<[u32; 3]> = model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+    let triangles = triangles(&model.indices);
     let mut found = Vec::new();
     for ((piece, triangle), share) in (0..).zip(&triangles).zip(area_shares(&model.vertices, &triangles)) {
         let count = (share * ALL).clamp(1.0, MOST) as usize;

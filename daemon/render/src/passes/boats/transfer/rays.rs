@@ -1,4 +1,4 @@
-//! What a ray from a boat's surface meets of the boat: a tree of boxes over its triangles, cut where rays meet boxes least often (MacDonald
+//! Rays from a boat's surface to the boat: a tree of boxes over its triangles, cut where rays meet boxes least often (MacDonald
 //! and Booth 1990, by slices as in Wald 2007).
 
 use bowwave_core::model::Model;
@@ -162,9 +162,7 @@ impl Rays {
         }
         found
     }
-}
 
-impl Rays {
     /// Shows `look` the triangles that may lie within the root of `within` metres of a place; it says within which they are wanted from then on.
     pub(super) fn near(&self, place: Vec3, mut within: f32, mut look: impl FnMut(u32) -> f32) {
         let place = Vec3A::from(place);

@@ -12,6 +12,7 @@ use super::{
     lighting::Lighting,
     places::{Place, area_shares, weigh},
 };
+use crate::passes::boats::parts::{WELD_M, spot, triangles};
 
 /// More triangles of the finer surface at most: a share of the model's, but so many for a simple model, and no more for one that is large.
 const MORE: f32 = 0.5;
@@ -27,9 +28,6 @@ const SHORTEST: f32 = 500.0;
 /// Places on a triangle at least: so many, but not denser than that would be on the whole boat.
 const PLACES: usize = 4;
 const DENSITY: f32 = 20_000.0;
-
-/// Corners closer than this are one, metres.
-const WELD_M: f32 = 1e-4;
 
 /// An edge by where it ends, so that triangles on both sides of a seam share it.
 type Edge = [[i32; 3]; 2];
@@ -47,7 +45,7 @@ pub(super) struct Surface {
 impl Surface {
     /// Cuts the triangles of `model` at their longest edges where corners err most against `places`, to which more are added.
     pub(super) fn finer(model: &Model, lighting: &Lighting, places: &mut Vec<Place>) -> Self {
-        let triangles: Vec<[u32; 3]> = model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+        let triangles = triangles(&model.indices);
         let dark = vec![DARK; model.vertices.len()];
         let faces = (0..triangles.len() as u32).collect();
         let mut made =
@@ -99,7 +97,7 @@ impl Surface {
     }
 
     fn edge(&self, (a, b): (u32, u32)) -> Edge {
-        let mut ends = [a, b].map(|i| (self.at(i) / WELD_M).round().as_ivec3().to_array());
+        let mut ends = [a, b].map(|i| spot(self.at(i)).to_array());
         ends.sort_unstable();
         ends
     }
@@ -271,7 +269,7 @@ mod tests {
             assert!(times > 1.3 && times < 1.0 + MORE + 0.1, "{name}: {times}");
             // Each edge of the finer surface lies as often one way as the other, or not, as on the model.
             let open = |vertices: &[Vertex], triangles: &[[u32; 3]]| {
-                let key = |i: u32| (vertices[i as usize].position / WELD_M).round().as_ivec3().to_array();
+                let key = |i: u32| spot(vertices[i as usize].position).to_array();
                 let mut edges: HashMap<Edge, i32> = HashMap::new();
                 for [a, b, c] in triangles {
                     for (from, to) in [(a, b), (b, c), (c, a)] {
@@ -286,10 +284,10 @@ mod tests {
                 };
                 edges.iter().map(|(edge, sum)| sum.unsigned_abs() as f32 * length(edge)).sum::<f32>()
             };
-            let triangles: Vec<[u32; 3]> =
-                model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-            let (before, after) =
-                (open(&model.vertices, &triangles), open(&surface.vertices, &surface.triangles));
+            let (before, after) = (
+                open(&model.vertices, &triangles(&model.indices)),
+                open(&surface.vertices, &surface.triangles),
+            );
             assert!(
                 (before - after).abs() < 1e-3 * before.max(1.0),
                 "{name}: {before} m of edges of one triangle, {after}"
