@@ -10,6 +10,7 @@ struct BoatBlock {
     vec4 eye;                  // xyz: the eye; w: share of the light that haze replaces
     vec4 lobes[9];             // light of the whole sky: its lobes' radiances
     vec4 shadow_from_boat[3];  // rows: to texels of the shadow map and nearness to the sun
+    vec4 shadow_box;           // the texels that are the boat's: lowest and highest place at which they are looked up
     vec4 lamps[BOAT_LAMPS];    // xyz: a lamp that lights it, metres; w is unused
     vec4 lamp_lights[BOAT_LAMPS];  // rgb: linear radiance of white matt that faces it a metre off, less what air takes on the way
     vec4 air;                  // rgb: lamplight of the air before it

@@ -25,10 +25,12 @@ layout(location = 0) out vec3 around_out;
 #ifdef MIRRORED
 const uint UV = 1;
 #else
-const uint UV = 3;
+const uint UV = 4;
 layout(location = 1) out vec3 sun_out;
-// Where the shadow map is looked up: within the triangle, since beyond it lie other boats' places, or nothing that was drawn.
+// Where the shadow map is looked up: within the triangle; and within the boat's own place in the map, since beyond it lie other boats', or
+// what was never drawn. A triangle thinner than a step of the rasteriser's grid covers samples outside itself.
 layout(location = 2) centroid out vec3 shade_out;
+layout(location = 3) flat out vec4 shade_box;
 #endif
 #ifdef TEXTURED
 layout(location = UV) out vec2 uv_out;
@@ -88,6 +90,7 @@ void main() {
     // A little off the surface, so that it does not shade itself by the map's texels.
     vec4 off = vec4(position + normal * boat.sun.w, 1.0);
     shade_out = vec3(dot(boat.shadow_from_boat[0], off), dot(boat.shadow_from_boat[1], off), dot(boat.shadow_from_boat[2], off));
+    shade_box = boat.shadow_box;
 #endif
 #ifdef TEXTURED
     uv_out = uv;

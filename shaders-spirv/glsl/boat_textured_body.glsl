@@ -15,7 +15,8 @@ layout(location = 1) in vec2 uv;
 layout(set = 2, binding = 0) uniform sampler2D skin;
 layout(location = 1) in vec3 sun;
 layout(location = 2) centroid in vec3 shade;
-layout(location = 3) in vec2 uv;
+layout(location = 3) flat in vec4 shade_box;
+layout(location = 4) in vec2 uv;
 #endif
 
 layout(location = 0) out vec4 colour;
@@ -31,7 +32,7 @@ void main() {
 #ifdef MIRRORED
     vec3 light = around;
 #else
-    vec3 light = around + sunlit(sun, shade);
+    vec3 light = around + sunlit(sun, shade, shade_box);
 #endif
     vec3 seen = mix(light * texel.rgb, frame.horizon.rgb, boats[draw.index].eye.w);
 #ifndef MIRRORED

@@ -9,9 +9,9 @@ layout(set = SHADOW_SET, binding = 0) uniform sampler2D shadow_map;
 // Nearer to the sun than all that is ever drawn into the map: nothing shades it.
 const float UNSHADED = 1.5;
 
-// Share of the sun's light that arrives at `place`: texels, and nearness to the sun, 0 to 1.
-float sun_share(vec3 place) {
-    vec2 texel = place.xy - 0.5;
+// Share of the sun's light that arrives at `place`: texels, not beyond those of `box`, and nearness to the sun, 0 to 1.
+float sun_share(vec3 place, vec4 box) {
+    vec2 texel = clamp(place.xy, box.xy, box.zw) - 0.5;
     vec4 nearest = textureGather(shadow_map, (floor(texel) + 1.0) / vec2(textureSize(shadow_map, 0)));
     vec4 lit = vec4(lessThanEqual(nearest, vec4(place.z)));
     vec2 share = fract(texel);
@@ -20,7 +20,7 @@ float sun_share(vec3 place) {
 
 // Of the light that the sun sends without shadow, what arrives at `place`. It is below nothing on what faces away: corners on either side of
 // where the sun grazes a triangle then say where that is.
-vec3 sunlit(vec3 sun, vec3 place) {
+vec3 sunlit(vec3 sun, vec3 place, vec4 box) {
     sun = max(sun, 0.0);
-    return place.z > UNSHADED || sun.g == 0.0 ? sun : sun * sun_share(place);
+    return place.z > UNSHADED || sun.g == 0.0 ? sun : sun * sun_share(place, box);
 }

@@ -84,6 +84,8 @@ block! {
         /// Rows of the matrix from the boat's space to texels of the shadow map and nearness to the sun, 0 to 1; nearness 2 where
         /// nothing shades the boat.
         pub shadow_from_boat: [[f32; 4]; 3],
+        /// Lowest and highest place in texels at which the map is looked up: the four texels about each are the boat's own.
+        pub shadow_box: [f32; 4],
         /// Lamps that light it, metres; the last is unused.
         pub lamps: [[f32; 4]; BOAT_LAMPS],
         /// Linear radiance of a white matt surface that faces each a metre off, less what air takes on the way; the last is unused.

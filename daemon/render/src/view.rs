@@ -87,13 +87,16 @@ pub(crate) fn drawn_pose(camera: &CameraPose, boat: &BoatView, kind: ModelKind) 
 pub(crate) struct Shade {
     /// Rows of the matrix from the boat's space to texels and nearness to the sun.
     pub(crate) from_boat: [[f32; 4]; 3],
+    /// Lowest and highest place, texels, at which the map is looked up.
+    pub(crate) texels: [f32; 4],
     /// Distance off the surface at which it is looked up, metres.
     pub(crate) off_m: f32,
 }
 
 impl Shade {
     /// Nothing shades it.
-    pub(crate) const NONE: Self = Self { from_boat: [[0.0; 4], [0.0; 4], [0.0, 0.0, 0.0, 2.0]], off_m: 0.0 };
+    pub(crate) const NONE: Self =
+        Self { from_boat: [[0.0; 4], [0.0; 4], [0.0, 0.0, 0.0, 2.0]], texels: [0.0; 4], off_m: 0.0 };
 }
 
 /// Boats are drawn simplified by no more than this, pixels.
@@ -152,6 +155,7 @@ pub(crate) fn boat_block(
             .as_vec4()
             .to_array(),
         shadow_from_boat: shade.from_boat,
+        shadow_box: shade.texels,
         eye: (boat_from_world * (eye - pose.position)).extend(f64::from(boat.haze)).as_vec4().to_array(),
     }
 }

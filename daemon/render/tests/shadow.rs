@@ -15,7 +15,7 @@ use bowwave_core::{
     sky::SkyLobes,
 };
 use common::{
-    at, draw, grey,
+    assert_clean, at, config, draw, grey, open, submit,
     testing::{add_boat_in, add_moving_boat, box_model, empty_scene},
 };
 use glam::{DQuat, DVec3, Vec3};
@@ -129,4 +129,45 @@ fn a_boat_throws_its_shadow_onto_the_foam_behind_it() {
         assert!(beyond <= 1, "no shadow beyond {reach:.1} m, {beyond} codes");
         assert!(within.0 * 20 < within.1 * 19, "a shadow up to {reach:.1} m: {within:?}");
     }
+}
+
+#[test]
+fn a_boats_light_is_the_same_whatever_was_drawn_before() {
+    let skiff = bowwave_models::resolve("skiff", std::path::Path::new(".")).unwrap();
+    let models = [skiff, box_model("box", [14.0, 12.0, 9.0], [0.5; 3])];
+    let picture = grey(SIZE.0, SIZE.1, 90);
+    // Far boats are a few pixels long: some of their triangles are thinner than a step of the rasteriser's grid.
+    let far = |n: u32| {
+        let n = f64::from(n);
+        let mut scene = sunlit_scene(DVec3::new((1.3 * n).sin(), (1.3 * n).cos(), 0.1 + (0.07 * n) % 1.0));
+        let turn = DQuat::from_rotation_z(0.37 * n) * DQuat::from_rotation_x(0.1 * (0.9 * n).sin());
+        let position = DVec3::new((1.7 * n) % 9.0 - 4.0, 60.0 + (7.3 * n) % 400.0, 0.0);
+        add_boat_in(&mut scene, &models, 0, RigidPose { world_from_body: turn, position });
+        boats_only(&mut scene);
+        scene
+    };
+    // Their places in the map lie about the far one's, full of what is nearer to the sun.
+    let near = || {
+        let mut scene = sunlit_scene(DVec3::new(0.7, -0.5, 0.6));
+        for x in [-20.0, 0.0, 20.0] {
+            let position = DVec3::new(x, 60.0, 0.0);
+            add_boat_in(&mut scene, &models, 1, RigidPose { world_from_body: DQuat::IDENTITY, position });
+        }
+        boats_only(&mut scene);
+        scene
+    };
+    let (mut used, mut used_done) = open(&config(&near()), &models);
+    let (mut fresh, mut fresh_done) = open(&config(&near()), &models);
+    let mut differ: Vec<u32> = Vec::new();
+    // Of six thousand frames, those about the ones in which it matters.
+    for n in (860..900).chain(2860..2980).chain(3880..3910) {
+        submit(&mut used, &mut used_done, &near(), &picture);
+        let after = submit(&mut used, &mut used_done, &far(n), &picture);
+        let pixels = submit(&mut fresh, &mut fresh_done, &far(n), &picture);
+        if pixels != after {
+            differ.push(n);
+        }
+    }
+    assert!(differ.is_empty(), "frames that differ: {differ:?}");
+    assert_clean(&used);
 }

@@ -8,7 +8,7 @@ use bowwave_core::{
     geometry::RigidPose,
     model::{Model, ModelId, ModelKind},
 };
-use glam::{DMat3, DQuat, DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use shaders_spirv::interface::ShadowBlock;
 
 use crate::{
@@ -123,9 +123,8 @@ impl SunView {
 pub(crate) struct ThrownShadow {
     /// Rows of the matrix from the world to texels and nearness to the sun.
     pub(crate) from_world: [[f64; 4]; 3],
-    /// The texels that are the boat's.
-    pub(crate) low: DVec2,
-    pub(crate) high: DVec2,
+    /// Lowest and highest place, texels, at which the boat is looked up.
+    pub(crate) texels: [f32; 4],
 }
 
 /// One frame's shadow map.
@@ -159,19 +158,10 @@ impl ShadowPlan {
 
     /// The shadow that a boat of the scene, by its number there, throws behind itself; none where it has no place in the map.
     pub(crate) fn thrown(&self, boat: usize) -> Option<ThrownShadow> {
-        /// What is nearer to the edge of a place than this, texels, is not looked up: its neighbours are another's.
-        const EDGE: f64 = 1.0;
         let view = self.views.get(boat)?.as_ref()?;
         let world = RigidPose { world_from_body: DQuat::IDENTITY, position: DVec3::ZERO };
         let ((wanted, _), placed) = self.wanted.get(boat).zip(self.places.get(boat))?;
-        let PixelRect { x, y, width, height } = placed.place;
-        let low = DVec2::new(f64::from(x), f64::from(y));
-        let size = DVec2::new(f64::from(width), f64::from(height));
-        Some(ThrownShadow {
-            from_world: view.rows(&world, wanted, placed),
-            low: low + EDGE,
-            high: low + size - EDGE,
-        })
+        Some(ThrownShadow { from_world: view.rows(&world, wanted, placed), texels: texels(placed) })
     }
 
     pub(crate) fn clear(&mut self) {
@@ -206,7 +196,8 @@ impl ShadowPlan {
             };
             let texel_m = view.texel_m(wanted, placed);
             let from_boat = view.rows(&boat.pose, wanted, placed).map(|row| row.map(|v| v as f32));
-            self.shades.push(Shade { from_boat, off_m: (OFF_TEXELS * texel_m) as f32 });
+            let off_m = (OFF_TEXELS * texel_m) as f32;
+            self.shades.push(Shade { from_boat, texels: texels(placed), off_m });
             self.clears.push(vk::ClearRect { rect: rect(placed.place), base_array_layer: 0, layer_count: 1 });
             // Each boat that is still to come has room for itself.
             let room = draws_max - (scene.boats.len() - i);
@@ -227,7 +218,14 @@ impl ShadowPlan {
     }
 }
 
-/// The same to clip space.
+/// Lowest and highest place at which a boat's texels are looked up: those about what is nearer to the edge are another's.
+fn texels(placed: &Placed) -> [f32; 4] {
+    const EDGE: u32 = 1;
+    let PixelRect { x, y, width, height } = placed.place;
+    [x + EDGE, y + EDGE, x + width - EDGE, y + height - EDGE].map(|texel| texel as f32)
+}
+
+/// What [`SunView::rows`] finds, to clip space.
 fn clip(rows: [[f64; 4]; 3]) -> [[f32; 4]; 3] {
     let spans = [f64::from(MAP.0), f64::from(MAP.1)];
     let mut clip = rows;

@@ -99,8 +99,7 @@ fn shade(thrown: &ThrownShadow, camera: &CameraPose) -> WakeHead {
         let at_camera = along.dot(camera.position) + row[3];
         (world_from_camera.transpose() * along).extend(at_camera).as_vec4().to_array()
     });
-    let (low, high) = (thrown.low.as_vec2(), thrown.high.as_vec2());
-    WakeHead { shade_rows, shade_box: [low.x, low.y, high.x, high.y], ..WakeHead::default() }
+    WakeHead { shade_rows, shade_box: thrown.texels, ..WakeHead::default() }
 }
 
 /// Whether the strip from a point to the next is seen so thin that it may go on to the one after that.
