@@ -63,6 +63,12 @@ block! {
         pub beam: [f32; 4],
         /// The camera's turn from row to row while a rolling shutter reads, radians about its axes; the last is unused.
         pub row_turn: [f32; 4],
+        /// Variance of the camera's noise in the dark, squared light; the last is the frame's own number, whole and below 2^24.
+        pub noise_read: [f32; 4],
+        /// Its growth with light; the last is 1 where pairs of pixels share the noise of their colour.
+        pub noise_shot: [f32; 4],
+        /// Red's share of green's noise and its own, blue's share of green's and of red's own.
+        pub noise_mix: [f32; 4],
     }
 }
 

@@ -64,6 +64,8 @@ shaders! {
     REFLECT_VERT = "reflect.vert";
     /// The boats' layer, averaged. Constant: 0 samples.
     COMPOSITE_FRAG = "composite.frag";
+    /// The same with the camera's noise. Constant: 0 samples.
+    COMPOSITE_NOISY_FRAG = "composite_noisy.frag";
     /// The mirror layer, softened.
     SOFTEN_FRAG = "soften.frag";
     /// How the video's brightness changes downwards.

@@ -146,6 +146,7 @@ fn printed_pass(plan: &ScenePlan, pass: Pass) -> PrintedPass {
                 }
                 Pass::Wake => "frames with a wake in view, on its pixels only",
                 Pass::Boats => "frames with a boat in view, on its pixels only",
+                Pass::Noise => "frames with a boat in view while the camera's noise is seen on it",
                 Pass::Lamplight => {
                     "frames by night with a searchlight, a flare or a fire, on the pixels that it lights"
                 }

@@ -250,6 +250,7 @@ impl Running {
             validation: false,
             frames_in_flight: 3,
             needs: Needs {
+                noise: false,
                 boats_max: scene.boats.len(),
                 lights_max: scene.lights.len(),
                 lamps: scene.runs(Pass::Lamplight),

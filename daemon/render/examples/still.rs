@@ -86,6 +86,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         validation: std::env::var_os("BOWWAVE_VALIDATE").is_some(),
         frames_in_flight: 2,
         needs: Needs {
+            noise: false,
             boats_max: 8,
             lights_max: 0,
             lamps: scene.runs(bowwave_core::frame::scene::Pass::Lamplight),

@@ -20,6 +20,8 @@ pub struct Needs {
     pub rounds_max: usize,
     /// Most navigation lights in one frame.
     pub lights_max: usize,
+    /// The camera's noise may have to be drawn on boats.
+    pub noise: bool,
     /// A searchlight, flares or fires may be asked for.
     pub lamps: bool,
     /// Most boats in one frame that leave a wake.
@@ -81,6 +83,7 @@ impl RenderConfig {
                 boats_max: only(Pass::Boats, plan.boats),
                 wakes_max: only(Pass::Wake, plan.moving),
                 lights_max: only(Pass::Lights, LIGHTS_A_BOAT * plan.boats + LAMPS_MAX),
+                noise: plan.has(Pass::Noise),
                 lamps: plan.has(Pass::Lamplight),
                 rounds_max: only(Pass::Rounds, ROUNDS_SEEN_MAX),
                 waters,

@@ -99,6 +99,8 @@ impl Outline {
 pub(crate) struct Plan {
     pub(crate) boat_blocks: Vec<BoatBlock>,
     pub(crate) shadows: ShadowPlan,
+    /// Boats get the camera's noise.
+    pub(crate) noisy: bool,
     pub(crate) water_blocks: Vec<WaterBlock>,
     /// The method's own blocks of each of `water_blocks`, one after the other.
     pub(crate) method_blocks: Vec<f32>,
@@ -167,6 +169,7 @@ impl Plan {
         Self {
             boat_blocks: Vec::with_capacity(boats * 2),
             shadows: ShadowPlan::with_capacity(boats),
+            noisy: false,
             water_blocks: Vec::with_capacity(boats),
             method_blocks: Vec::with_capacity(boats * MethodBytes::default().len()),
             round_blocks: Vec::with_capacity(rounds),
@@ -220,6 +223,7 @@ impl Plan {
     ) {
         self.clear();
         self.touched.extend_from_slice(lit);
+        self.noisy = scene.runs(Pass::Noise);
         if scene.runs(Pass::Shadow) {
             self.shadows.make(scene, |id| models.get(usize::from(id.0)).map(|outline| &outline.model));
         }

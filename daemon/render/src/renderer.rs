@@ -471,7 +471,9 @@ impl<T> Renderer<T> {
             to.scissor(area);
         }
         if let Some(pass) = self.passes.boats.as_ref().filter(|_| !plan.boats.is_empty()) {
-            stamps.around(Span::Composite, || pass.record_composite(to, frame, plan.hulls.len() as u32));
+            let span = if plan.noisy { Span::CompositeNoisy } else { Span::Composite };
+            let what = (plan.hulls.len() as u32, plan.noisy);
+            stamps.around(span, || pass.record_composite(to, frame, what));
         }
         if let Some(pass) = self.passes.wake.as_ref().filter(|_| plan.wakes.iter().any(|w| w.spray)) {
             stamps.around(Span::Spray, || pass.record_spray(to, frame, &plan.wakes));

@@ -68,6 +68,7 @@ pub(crate) enum Span {
     Water,
     Wake,
     Composite,
+    CompositeNoisy,
     Spray,
     Lamplight,
     Lights,
@@ -78,7 +79,7 @@ pub(crate) enum Span {
 }
 
 impl Span {
-    const ALL: [Self; 19] = [
+    const ALL: [Self; 20] = [
         Self::Video,
         Self::Download,
         Self::Shadow,
@@ -91,6 +92,7 @@ impl Span {
         Self::Water,
         Self::Wake,
         Self::Composite,
+        Self::CompositeNoisy,
         Self::Spray,
         Self::Lamplight,
         Self::Lights,
@@ -109,6 +111,7 @@ impl Span {
             Self::Backdrop | Self::Field | Self::Layers | Self::Water => Pass::Water,
             Self::Wake | Self::Spray => Pass::Wake,
             Self::BoatLayer | Self::Composite => Pass::Boats,
+            Self::CompositeNoisy => Pass::Noise,
             Self::Lamplight => Pass::Lamplight,
             Self::Lights => Pass::Lights,
             Self::Rounds => Pass::Rounds,

@@ -53,6 +53,7 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
         wind: DVec2::new(0.6, 0.6),
         sky: SkyLight::of_bands(Vec3::new(0.6, 0.66, 0.72), Vec3::new(0.35, 0.42, 0.52)),
         tones: SeaTones::default(),
+        noise: None,
         hud: Hud {
             status: Status::Ready,
             warning: None,

@@ -2,7 +2,7 @@
 //! rounded, so nothing loses digits with distance from the mount.
 
 use bowwave_core::{
-    estimate::light::Light,
+    estimate::light::{CameraNoise, Light},
     frame::{
         lamps::{LAMPS_MAX, LampView},
         scene::{BoatView, Scene},
@@ -24,7 +24,12 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
         let matt = light.strength * std::f64::consts::FRAC_1_PI;
         (light.lamp.extend(light.sharpness).as_vec4(), light.axis.extend(matt).as_vec4())
     });
+    let [noise_read, noise_shot, noise_mix] =
+        scene.noise.map_or_else(Default::default, |noise| noise_rows(&noise, scene.frame));
     FrameBlock {
+        noise_read,
+        noise_shot,
+        noise_mix,
         focal: pair(lens.focal),
         centre: pair(lens.centre),
         bend: bend(&lens.distortion),
@@ -39,6 +44,22 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
         beam: beam.to_array(),
         row_turn: lens.row_turn.extend(0.0).as_vec4().to_array(),
     }
+}
+
+/// The camera's noise as its shader draws it, in a frame.
+fn noise_rows(noise: &CameraNoise, frame: u64) -> [[f32; 4]; 3] {
+    /// Numbers that single precision holds; the noise of a week's frames before is known to nobody.
+    const FRAMES: u64 = 1 << 24;
+    let [with_red, with_blue, red_blue] = noise.together.to_array();
+    // Green is drawn first, then what red has beyond it, then what blue has beyond both (Cholesky).
+    let own = (1.0 - with_red * with_red).max(0.0).sqrt();
+    let blue_of_red = if own > 0.05 { (red_blue - with_red * with_blue) / own } else { 0.0 };
+    let most = (1.0 - with_blue * with_blue).max(0.0).sqrt();
+    [
+        noise.read.extend((frame % FRAMES) as f32).to_array(),
+        noise.shot.extend(f32::from(u8::from(noise.is_paired()))).to_array(),
+        [with_red, own, with_blue, blue_of_red.clamp(-most, most)],
+    ]
 }
 
 /// A fisheye is followed up to this angle from its axis, radians: what is drawn lies before the camera's plane.

@@ -6,7 +6,7 @@ use super::{
     attitude::Source,
     clock::ClockReport,
     heading_aiding::HeadingSettings,
-    light::{Light, LightMeter, Luminaries, SeaTones, SkyAgreement, SkyLight},
+    light::{CameraNoise, Light, LightMeter, Luminaries, SeaTones, SkyAgreement, SkyLight},
     pose::NoPose,
     recoil::RecoilFinder,
     registration::{Misfit, RegistrationChecks},
@@ -70,6 +70,8 @@ pub struct SceneLight {
     pub tones: SeaTones,
     /// Luminance that the camera shows as white, cd/m^2.
     pub white_cd_m2: f64,
+    /// The camera's noise, where it is seen on boats.
+    pub noise: Option<CameraNoise>,
 }
 
 /// All that is estimated from devices' reports.
@@ -216,7 +218,8 @@ impl Estimator {
         let (wind, _) = self.wind();
         let (boats, tones) = (self.light.light(), self.light.tones());
         let white_cd_m2 = self.light.white_cd_m2();
-        SceneLight { boats, sky: self.light.sky(wind.length()), tones, white_cd_m2 }
+        let noise = self.light.noise();
+        SceneLight { boats, sky: self.light.sky(wind.length()), tones, white_cd_m2, noise }
     }
 
     /// Sun and moon at the newest picture.

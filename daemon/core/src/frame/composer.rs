@@ -135,6 +135,7 @@ impl Composer {
             wind: scenario.wind.truncate(),
             sky: light.sky,
             tones: light.tones,
+            noise: None,
             hud: Hud { rounds_left: scenario.weapon.belt, ..Hud::READY },
             guide: None,
         };
@@ -267,9 +268,11 @@ impl Composer {
             shining.map(|spec| SearchlightView::new(spec, self.bore, light.white_cd_m2, self.visibility_m));
         scene.recoil = estimator.recoil();
         (scene.light, scene.sky, scene.tones) = (light.boats, light.sky, light.tones);
+        scene.noise = light.noise;
         scene.passes = self.plan.frame(&InView {
             pose_known: camera.is_some(),
             sun_shines: scene.light.sun_shines(),
+            noisy: scene.noise.is_some(),
             lamps: scene.searchlight.is_some() || !scene.lamps.is_empty(),
             boats: &scene.boats,
             lights: &scene.lights,
@@ -338,6 +341,7 @@ impl Composer {
         let in_view = InView {
             pose_known: true,
             sun_shines: true,
+            noisy: true,
             lamps: searchlight.is_some(),
             boats: &boats,
             lights: &lights,

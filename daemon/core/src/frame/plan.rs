@@ -81,6 +81,8 @@ pub struct InView<'a> {
     pub pose_known: bool,
     /// The sun shines so that it casts shadows.
     pub sun_shines: bool,
+    /// The camera has noise that is seen on boats.
+    pub noisy: bool,
     /// Boats that are seen, or mirrored.
     pub boats: &'a [BoatView],
     /// A lamp shines.
@@ -168,6 +170,10 @@ impl ScenePlan {
         passes[Pass::Water as usize] = water;
         passes[Pass::Wake as usize] = wake;
         passes[Pass::Boats as usize] = boats;
+        passes[Pass::Noise as usize] = match boats {
+            PassDecision::Run if needs.sun_stays_up => PassDecision::LeftOut(LeftOut::Daylight),
+            other => other,
+        };
         passes[Pass::Lamplight as usize] = lamplight;
         passes[Pass::Lights as usize] = lights;
         passes[Pass::Rounds as usize] = rounds;
@@ -198,7 +204,7 @@ impl ScenePlan {
 
     /// The passes of one frame: what the plan allows and what is in view asks for.
     pub fn frame(&self, in_view: &InView<'_>) -> [PassDecision; Pass::COUNT] {
-        let InView { pose_known, sun_shines, lamps, boats, lights, rounds } = *in_view;
+        let InView { pose_known, sun_shines, noisy, lamps, boats, lights, rounds } = *in_view;
         let mut passes = self.passes;
         let mut leave_out = |pass: Pass, unless: bool, why: LeftOut| {
             let decision = &mut passes[pass as usize];
@@ -216,6 +222,8 @@ impl ScenePlan {
         leave_out(Pass::Water, reflected, LeftOut::NoReflectionInView);
         leave_out(Pass::Wake, boats.iter().any(|b| b.wake.is_some()), LeftOut::NoWakeInView);
         leave_out(Pass::Boats, boats.iter().any(|b| b.hull.is_some()), LeftOut::NoBoatInView);
+        leave_out(Pass::Noise, boats.iter().any(|b| b.hull.is_some()), LeftOut::NoBoatInView);
+        leave_out(Pass::Noise, noisy, LeftOut::NoiseUnseen);
         leave_out(Pass::Lamplight, lamps, LeftOut::NoLampShines);
         leave_out(Pass::Lights, !lights.is_empty(), LeftOut::NoLightInView);
         leave_out(Pass::Rounds, !rounds.is_empty(), LeftOut::NoRoundInView);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::{
-    estimate::light::Light,
+    estimate::light::{CameraNoise, Light},
     estimate::{
         light::{SeaTones, SkyLight},
         sea::SeaSource,
@@ -62,6 +62,8 @@ pub struct Scene {
     pub sky: SkyLight,
     /// How bright the sea is in the picture.
     pub tones: SeaTones,
+    /// The camera's noise, where it is seen on boats.
+    pub noise: Option<CameraNoise>,
     /// The head-up display.
     pub hud: Hud,
     /// The page that it shows instead of counts and state, while a maintainer calibrates.
@@ -96,6 +98,8 @@ pub enum Pass {
     Wake,
     /// The boats.
     Boats,
+    /// The camera's noise on them.
+    Noise,
     /// The light of searchlight, flares and fires on sea and air.
     Lamplight,
     /// Points of light: boats' navigation lights, fires, flares.
@@ -110,7 +114,7 @@ pub enum Pass {
 
 impl Pass {
     /// How many there are.
-    pub const COUNT: usize = 11;
+    pub const COUNT: usize = 12;
     /// All of them, in order.
     pub const ALL: [Self; Self::COUNT] = [
         Self::Video,
@@ -119,6 +123,7 @@ impl Pass {
         Self::Water,
         Self::Wake,
         Self::Boats,
+        Self::Noise,
         Self::Lamplight,
         Self::Lights,
         Self::Rounds,
@@ -135,6 +140,7 @@ impl Pass {
             Self::Water => "water",
             Self::Wake => "wake",
             Self::Boats => "boats",
+            Self::Noise => "noise",
             Self::Lamplight => "lamplight",
             Self::Lights => "lights",
             Self::Rounds => "rounds",
@@ -188,6 +194,8 @@ pub enum LeftOut {
     NoLampShines,
     /// The sun does not shine: it is down, or clouds hide it.
     NoSun,
+    /// The camera has no noise that is seen on boats.
+    NoiseUnseen,
     /// The calibration has no outline of the own gun or ship.
     NoPhantoms,
     /// Nothing is drawn that they could hide.
@@ -218,6 +226,7 @@ impl LeftOut {
             Self::NoLamps => "no_lamps",
             Self::NoLampShines => "no_lamp_shines",
             Self::NoSun => "no_sun",
+            Self::NoiseUnseen => "noise_unseen",
             Self::NoPhantoms => "no_phantoms",
             Self::NothingToHide => "nothing_to_hide",
             Self::NoPose => "no_pose",

@@ -188,6 +188,7 @@ impl Still {
         let in_view = InView {
             pose_known: true,
             sun_shines: light.sun_shines(),
+            noisy: meter.noise().is_some(),
             lamps: false,
             boats: &boats,
             lights: &[],
@@ -213,6 +214,7 @@ impl Still {
             wind: -place(self.waves.wind_from, self.water.force.wind_mean_m_s()),
             sky: meter.sky(self.water.force.wind_mean_m_s()),
             tones: meter.tones(),
+            noise: meter.noise(),
             hud: Hud::READY,
             guide: None,
         };

@@ -63,7 +63,7 @@ impl Passes {
             }
             _ => None,
         };
-        let boats = drawn.map(|drawn| BoatsPass::new(context, drawn, textured)).transpose()?;
+        let boats = drawn.map(|drawn| BoatsPass::new(context, drawn, [textured, needs.noise])).transpose()?;
         let shadow_map = shadow.as_ref().map(|shadow| &shadow.map);
         let wake = boats.as_ref().zip(shadow_map).filter(|_| needs.wakes_max > 0);
         let wake = wake.map(|drawn| WakePass::new(context, drawn)).transpose()?;

@@ -26,6 +26,7 @@ pub fn config(scene: &Scene) -> RenderConfig {
         validation: true,
         frames_in_flight: 2,
         needs: Needs {
+            noise: scene.runs(bowwave_core::frame::scene::Pass::Noise),
             boats_max: scene.boats.len(),
             lights_max: scene.lights.len(),
             lamps: scene.runs(bowwave_core::frame::scene::Pass::Lamplight),

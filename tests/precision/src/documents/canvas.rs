@@ -140,6 +140,7 @@ pub fn draw_over(before: &RgbImage, scene: &Scene, models: &[Model], phantoms: P
         validation: false,
         frames_in_flight: 1,
         needs: Needs {
+            noise: false,
             boats_max: scene.boats.len(),
             lights_max: scene.lights.len(),
             lamps: scene.runs(Pass::Lamplight),

@@ -28,6 +28,7 @@ mod misses;
 mod moon;
 mod motion;
 mod mount;
+mod noise;
 mod orientation;
 mod own;
 mod pacing;
@@ -95,6 +96,7 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: lamps::ABOUT, measure: lamps::measure },
     NumericalPart { about: relight::ABOUT, measure: relight::measure },
     NumericalPart { about: fires::ABOUT, measure: fires::measure },
+    NumericalPart { about: noise::ABOUT, measure: noise::measure },
     NumericalPart { about: seeing::ABOUT, measure: seeing::measure },
     NumericalPart { about: lens::ABOUT, measure: lens::measure },
     NumericalPart { about: drawn::ABOUT, measure: drawn::measure },

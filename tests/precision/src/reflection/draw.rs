@@ -180,6 +180,7 @@ pub fn bare_scene(
         wind: DVec2::ZERO,
         sky: SkyLight::of_bands(light.horizon, light.sky),
         tones: SeaTones::default(),
+        noise: None,
         hud: Hud::READY,
         guide: None,
     }
@@ -273,6 +274,7 @@ impl Painter {
             validation: false,
             frames_in_flight: 1,
             needs: Needs {
+                noise: false,
                 boats_max,
                 lights_max: 0,
                 lamps: false,

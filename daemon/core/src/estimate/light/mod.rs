@@ -6,11 +6,13 @@
 
 mod dome;
 mod luminary;
+mod noise;
 mod sky;
 mod tones;
 
 pub use dome::{FittedSky, SkyFamily, SkyPixel};
 pub use luminary::{Luminaries, SkyClock};
+pub use noise::{CameraNoise, NoiseMeter};
 pub use sky::{SKY_SINES, SkyLight};
 pub use tones::{SeaTones, ToneSample};
 
@@ -127,6 +129,8 @@ pub struct LightMeter {
     wants_tones: bool,
     means: Option<(Time, Means)>,
     tones: Option<(Time, SeaTones)>,
+    /// By day no camera has noise that is seen on boats.
+    noise: Option<NoiseMeter>,
 }
 
 impl LightMeter {
@@ -142,6 +146,7 @@ impl LightMeter {
             wants_tones,
             means: None,
             tones: None,
+            noise: (!daylight.stays_up()).then(NoiseMeter::default),
         }
     }
 
@@ -200,6 +205,10 @@ impl LightMeter {
             }
         };
         self.means = Some((time, means));
+        let on_level = self.light().on_level();
+        if let Some(noise) = &mut self.noise {
+            noise.observe(time, picture, on_level);
+        }
     }
 
     fn is_fit_due(&self, time: Time) -> bool {
@@ -265,6 +274,11 @@ impl LightMeter {
         }
         let [least, most] = MATCH;
         seen.scaled((found / expected).clamp(Vec3::splat(least), Vec3::splat(most)))
+    }
+
+    /// The camera's noise, where it is seen on boats.
+    pub fn noise(&self) -> Option<CameraNoise> {
+        self.noise.as_ref().and_then(NoiseMeter::seen)
     }
 
     /// How bright the sea is; a default where that is not measured.

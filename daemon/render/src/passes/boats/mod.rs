@@ -14,7 +14,8 @@ use bowwave_core::{frame::scene::PixelRect, model::ModelId};
 use meshes::Meshes;
 use shaders_spirv::{
     BOAT_FRAG, BOAT_MIRRORED_FRAG, BOAT_MIRRORED_VERT, BOAT_TEXTURED_FRAG, BOAT_TEXTURED_MIRRORED_FRAG,
-    BOAT_TEXTURED_MIRRORED_VERT, BOAT_TEXTURED_VERT, BOAT_VERT, COMPOSITE_FRAG, RECT_VERT,
+    BOAT_TEXTURED_MIRRORED_VERT, BOAT_TEXTURED_VERT, BOAT_VERT, COMPOSITE_FRAG, COMPOSITE_NOISY_FRAG,
+    RECT_VERT,
     interface::{DrawBlock, MeshVertex},
 };
 
@@ -136,6 +137,8 @@ pub(crate) struct BoatsPass {
     depth: Image,
     pipelines: BoatPipelines,
     composite: Pipeline,
+    /// The same with the camera's noise.
+    noisy: Option<Pipeline>,
     layer: TextureSet,
 }
 
@@ -143,7 +146,7 @@ impl BoatsPass {
     pub(crate) fn new(
         context: &PassContext<'_>,
         (meshes, shadow): (&Meshes, &TextureSet),
-        any_textured: bool,
+        [any_textured, noisy]: [bool; 2],
     ) -> Result<Self, RenderError> {
         let gpu = context.gpu;
         let layer =
@@ -160,15 +163,15 @@ impl BoatsPass {
         let pipelines =
             BoatPipelines::new(context, (meshes, Some(shadow)), SAMPLES, front, UNORM, any_textured)?;
         let layer = context.texture_set(colour.view)?;
-        let composite = Pipeline::new(
-            gpu,
-            &PipelineShape {
-                vertex_constants: &[],
-                constants: &[SAMPLES.as_raw()],
-                ..PipelineShape::over_screen(RECT_VERT, COMPOSITE_FRAG, &[context.frame_set, &layer.layout])
-            },
-        )?;
-        Ok(Self { size: context.size, colour, depth, pipelines, composite, layer })
+        let composite = |fragment| {
+            let sets = [context.frame_set, &*layer.layout];
+            let shape = PipelineShape::over_screen(RECT_VERT, fragment, &sets);
+            let constants = [SAMPLES.as_raw()];
+            Pipeline::new(gpu, &PipelineShape { vertex_constants: &[], constants: &constants, ..shape })
+        };
+        let noisy = noisy.then(|| composite(COMPOSITE_NOISY_FRAG)).transpose()?;
+        let composite = composite(COMPOSITE_FRAG)?;
+        Ok(Self { size: context.size, colour, depth, pipelines, composite, noisy, layer })
     }
 
     /// Steps of the layer's images from what the frame before did to being drawn.
@@ -219,10 +222,16 @@ impl BoatsPass {
     }
 
     /// Puts the layer onto the screen, within a rendering to it: the first `pieces` rectangles of the frame's list, which do not
-    /// overlap.
-    pub(crate) fn record_composite(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, pieces: u32) {
-        to.bind(&self.composite, &[frame, self.layer.set]);
-        to.push(&self.composite, &DrawBlock::default());
+    /// overlap. With the camera's noise where it is `noisy` and was asked for before.
+    pub(crate) fn record_composite(
+        &self,
+        to: CommandEncoder<'_>,
+        frame: vk::DescriptorSet,
+        (pieces, noisy): (u32, bool),
+    ) {
+        let composite = self.noisy.as_ref().filter(|_| noisy).unwrap_or(&self.composite);
+        to.bind(composite, &[frame, self.layer.set]);
+        to.push(composite, &DrawBlock::default());
         to.draw(4, pieces);
     }
 }
