@@ -13,6 +13,6 @@ void main() {
     if (colour.a == 0.0) {
         discard;
     }
-    // Of what is half covered, the video has the noise of the other half.
+    // Noise is scaled by cover; the video below brings its own for the rest.
     colour.rgb = max(colour.rgb + colour.a * camera_noise(at, colour.rgb / colour.a), 0.0);
 }

@@ -15,9 +15,9 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     vec4 lamp;        // xyz: the searchlight, camera's axes, metres; w: its light falls with exp(-w sin^2 of the angle off its axis)
     vec4 beam;        // xyz: its axis, camera's axes; w: linear radiance of white matt that faces it a metre off
     vec4 row_turn;    // the camera's turn from row to row while a rolling shutter reads, radians about its axes
-    vec4 noise_read;  // rgb: variance of the camera's noise in the dark, squared light; w: the frame's own number
-    vec4 noise_shot;  // rgb: its growth with light; w: 1 where pairs of pixels share the noise of their colour
-    vec4 noise_mix;   // red's share of green's noise and its own, blue's share of green's and of red's own
+    // The camera's noise: rgb, variance in the dark, squared light; rgb, its growth with light; red's share of green's noise and its own,
+    // blue's share of green's and of red's own; the picture's number, its pixels for one of the screen, 1 where pairs share their colour.
+    vec4 noise[4];
 } frame;
 
 // Pixels to clip space.

@@ -1,4 +1,4 @@
-// The camera's noise: as strong as the video's at that light, another in each pixel and frame.
+// The camera's noise: as strong as the video's at that light, another in each pixel and picture.
 
 // A number scrambled (Jarzynski & Olano 2020, "Hash functions for GPU rendering": pcg).
 uint scrambled(uint number) {
@@ -14,13 +14,15 @@ float normal(uint number) {
 }
 
 vec3 camera_noise(ivec2 at, vec3 light) {
-    uint frame_number = uint(frame.noise_read.w);
-    uint pixel = scrambled(scrambled(frame_number) + uint(at.x) + (uint(at.y) << 16));
-    ivec2 shared_by = frame.noise_shot.w > 0.5 ? ivec2(at.x >> 1, at.y) : at;
-    uint first = scrambled(scrambled(~frame_number) + uint(shared_by.x) + (uint(shared_by.y) << 16));
-    float green = normal(pixel), reds = normal(first), blues = normal(scrambled(first));
-    vec4 mixed = frame.noise_mix;
+    vec4 mixed = frame.noise[2], grain = frame.noise[3];
+    // As large as the picture's pixels are on the screen.
+    ivec2 own = ivec2((vec2(at) + 0.5) * grain.y);
+    ivec2 pair = grain.z > 0.5 ? ivec2(own.x >> 1, own.y) : own;
+    uint picture = uint(grain.x);
+    uint pixel = scrambled(scrambled(picture) + uint(own.x) + (uint(own.y) << 16));
+    uint colour = scrambled(scrambled(~picture) + uint(pair.x) + (uint(pair.y) << 16));
+    float green = normal(pixel), reds = normal(colour), blues = normal(scrambled(colour));
     float rest = sqrt(max(1.0 - dot(mixed.zw, mixed.zw), 0.0));
     vec3 even = vec3(mixed.x * green + mixed.y * reds, green, mixed.z * green + mixed.w * reds + rest * blues);
-    return even * sqrt(frame.noise_read.rgb + frame.noise_shot.rgb * light);
+    return even * sqrt(frame.noise[0].rgb + frame.noise[1].rgb * light);
 }

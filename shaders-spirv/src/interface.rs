@@ -63,12 +63,10 @@ block! {
         pub beam: [f32; 4],
         /// The camera's turn from row to row while a rolling shutter reads, radians about its axes; the last is unused.
         pub row_turn: [f32; 4],
-        /// Variance of the camera's noise in the dark, squared light; the last is the frame's own number, whole and below 2^24.
-        pub noise_read: [f32; 4],
-        /// Its growth with light; the last is 1 where pairs of pixels share the noise of their colour.
-        pub noise_shot: [f32; 4],
-        /// Red's share of green's noise and its own, blue's share of green's and of red's own.
-        pub noise_mix: [f32; 4],
+        /// The camera's noise: its variance in the dark, squared light; its growth with light; red's share of green's noise and its own, blue's
+        /// share of green's and of red's own; and the picture's number, whole and below 2^24, pixels of the picture for one of the screen, at
+        /// most 1, and 1 where pairs of pixels share the noise of their colour.
+        pub noise: [[f32; 4]; 4],
     }
 }
 

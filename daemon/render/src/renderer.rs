@@ -240,6 +240,9 @@ impl<T> Renderer<T> {
         if scene.runs(Pass::Lamplight) && !self.needs.lamps {
             return missing("lamps");
         }
+        if scene.runs(Pass::Noise) && !self.needs.noise {
+            return missing("the camera's noise");
+        }
         if scene.runs(Pass::Wake)
             && scene.boats.iter().filter(|b| b.wake.is_some()).count() > self.needs.wakes_max
         {
@@ -471,9 +474,8 @@ impl<T> Renderer<T> {
             to.scissor(area);
         }
         if let Some(pass) = self.passes.boats.as_ref().filter(|_| !plan.boats.is_empty()) {
-            let span = if plan.noisy { Span::CompositeNoisy } else { Span::Composite };
             let what = (plan.hulls.len() as u32, plan.noisy);
-            stamps.around(span, || pass.record_composite(to, frame, what));
+            stamps.around(Span::Composite, || pass.record_composite(to, frame, what));
         }
         if let Some(pass) = self.passes.wake.as_ref().filter(|_| plan.wakes.iter().any(|w| w.spray)) {
             stamps.around(Span::Spray, || pass.record_spray(to, frame, &plan.wakes));

@@ -68,7 +68,6 @@ pub(crate) enum Span {
     Water,
     Wake,
     Composite,
-    CompositeNoisy,
     Spray,
     Lamplight,
     Lights,
@@ -79,7 +78,7 @@ pub(crate) enum Span {
 }
 
 impl Span {
-    const ALL: [Self; 20] = [
+    const ALL: [Self; 19] = [
         Self::Video,
         Self::Download,
         Self::Shadow,
@@ -92,7 +91,6 @@ impl Span {
         Self::Water,
         Self::Wake,
         Self::Composite,
-        Self::CompositeNoisy,
         Self::Spray,
         Self::Lamplight,
         Self::Lights,
@@ -111,7 +109,6 @@ impl Span {
             Self::Backdrop | Self::Field | Self::Layers | Self::Water => Pass::Water,
             Self::Wake | Self::Spray => Pass::Wake,
             Self::BoatLayer | Self::Composite => Pass::Boats,
-            Self::CompositeNoisy => Pass::Noise,
             Self::Lamplight => Pass::Lamplight,
             Self::Lights => Pass::Lights,
             Self::Rounds => Pass::Rounds,

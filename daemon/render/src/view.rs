@@ -2,7 +2,7 @@
 //! rounded, so nothing loses digits with distance from the mount.
 
 use bowwave_core::{
-    estimate::light::{CameraNoise, Light},
+    estimate::light::{Light, SeenNoise},
     frame::{
         lamps::{LAMPS_MAX, LampView},
         scene::{BoatView, Scene},
@@ -24,12 +24,9 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
         let matt = light.strength * std::f64::consts::FRAC_1_PI;
         (light.lamp.extend(light.sharpness).as_vec4(), light.axis.extend(matt).as_vec4())
     });
-    let [noise_read, noise_shot, noise_mix] =
-        scene.noise.map_or_else(Default::default, |noise| noise_rows(&noise, scene.frame));
+    let noise = scene.noise.map_or_else(Default::default, |seen| noise_rows(&seen, lens.width));
     FrameBlock {
-        noise_read,
-        noise_shot,
-        noise_mix,
+        noise,
         focal: pair(lens.focal),
         centre: pair(lens.centre),
         bend: bend(&lens.distortion),
@@ -46,19 +43,23 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
     }
 }
 
-/// The camera's noise as its shader draws it, in a frame.
-fn noise_rows(noise: &CameraNoise, frame: u64) -> [[f32; 4]; 3] {
-    /// Numbers that single precision holds; the noise of a week's frames before is known to nobody.
-    const FRAMES: u64 = 1 << 24;
+/// The camera's noise as its shader draws it on a screen of that width.
+fn noise_rows(seen: &SeenNoise, width: u32) -> [[f32; 4]; 4] {
+    /// Whole numbers up to here are exact in single precision; after so many pictures noise comes again.
+    const PICTURES: u32 = 1 << 24;
+    let noise = &seen.noise;
     let [with_red, with_blue, red_blue] = noise.together.to_array();
     // Green is drawn first, then what red has beyond it, then what blue has beyond both (Cholesky).
     let own = (1.0 - with_red * with_red).max(0.0).sqrt();
     let blue_of_red = if own > 0.05 { (red_blue - with_red * with_blue) / own } else { 0.0 };
     let most = (1.0 - with_blue * with_blue).max(0.0).sqrt();
+    // Where the picture is drawn larger, its grain is; where it is drawn smaller, pixels are left out of it.
+    let picture_pixels = (seen.width as f32 / width as f32).min(1.0);
     [
-        noise.read.extend((frame % FRAMES) as f32).to_array(),
-        noise.shot.extend(f32::from(u8::from(noise.is_paired()))).to_array(),
+        noise.read.extend(0.0).to_array(),
+        noise.shot.extend(0.0).to_array(),
         [with_red, own, with_blue, blue_of_red.clamp(-most, most)],
+        [(seen.picture % PICTURES) as f32, picture_pixels, f32::from(u8::from(noise.is_paired())), 0.0],
     ]
 }
 

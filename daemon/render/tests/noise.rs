@@ -10,11 +10,12 @@ mod common;
 
 use bowwave_core::{
     colour::srgb_to_linear,
-    estimate::light::CameraNoise,
+    estimate::light::{CameraNoise, SeenNoise},
     frame::scene::{LeftOut, Pass, PassDecision, Scene},
     geometry::{RigidPose, look},
     sky::SkyLobes,
 };
+use bowwave_render::DrawRequest;
 use common::{
     assert_clean, config, grey, open, submit,
     testing::{add_boat_in, box_model, empty_scene},
@@ -23,11 +24,14 @@ use glam::{DQuat, DVec3, Vec3};
 
 const SIZE: (u32, u32) = (320, 180);
 
+fn seen(noise: CameraNoise, picture: u32, width: u32) -> SeenNoise {
+    SeenNoise { noise, picture, width }
+}
+
 /// A wall of albedo 0.5 that fills the middle of the picture.
-fn wall(light: f32, noise: Option<CameraNoise>, frame: u64) -> (Scene, [bowwave_core::model::Model; 1]) {
+fn wall(light: f32, noise: Option<CameraNoise>) -> (Scene, [bowwave_core::model::Model; 1]) {
     let models = [box_model("box", [30.0, 3.0, 30.0], [0.5; 3])];
     let mut scene = empty_scene(SIZE.0, SIZE.1);
-    scene.frame = frame;
     scene.camera.world_from_camera = look(0.0, 0.0, 0.0);
     (scene.light.sun, scene.light.sky) = (Vec3::ZERO, Vec3::splat(light));
     (scene.light.sea, scene.light.horizon) = (Vec3::splat(light), Vec3::splat(light));
@@ -38,7 +42,7 @@ fn wall(light: f32, noise: Option<CameraNoise>, frame: u64) -> (Scene, [bowwave_
         scene.passes[pass as usize] = PassDecision::LeftOut(LeftOut::ReflectionOff);
     }
     scene.passes[Pass::Noise as usize] = PassDecision::Run;
-    scene.noise = noise;
+    scene.noise = noise.map(|noise| seen(noise, 0, SIZE.0));
     (scene, models)
 }
 
@@ -66,25 +70,26 @@ fn boats_get_the_noise_that_is_asked_for() {
     };
     let picture = grey(SIZE.0, SIZE.1, 60);
     for light in [0.2, 0.8] {
-        let ((scene, models), (bare, _)) = (wall(light, Some(noise), 7), wall(light, None, 7));
+        let ((scene, models), (bare, _)) = (wall(light, Some(noise)), wall(light, None));
         let (mut renderer, mut done) = open(&config(&scene), &models);
         let mut without = bare;
         without.passes[Pass::Noise as usize] = PassDecision::LeftOut(LeftOut::NoiseUnseen);
         let clean = mean(on_wall(&submit(&mut renderer, &mut done, &without, &picture)).into_iter());
         let (mut pixels, mut first) = (Vec::new(), Vec::new());
-        for frame in 0..8 {
-            let drawn = submit(&mut renderer, &mut done, &Scene { frame, ..scene.clone() }, &picture);
+        let of = |n: u32| Scene { noise: Some(seen(noise, n, SIZE.0)), ..scene.clone() };
+        for n in 0..8 {
+            let drawn = submit(&mut renderer, &mut done, &of(n), &picture);
             pixels.extend(on_wall(&drawn));
-            if frame == 0 {
+            if n == 0 {
                 first = drawn;
                 continue;
             }
-            assert_ne!(on_wall(&drawn), on_wall(&first), "frame {frame} has the noise of the first");
+            assert_ne!(on_wall(&drawn), on_wall(&first), "picture {n} has the noise of the first");
             // Beside the boat lies the video alone.
             assert_eq!(drawn[..4 * 20], first[..4 * 20]);
         }
-        let again = submit(&mut renderer, &mut done, &Scene { frame: 0, ..scene.clone() }, &picture);
-        assert_eq!(again, first, "the same frame has the same noise");
+        let again = submit(&mut renderer, &mut done, &of(0), &picture);
+        assert_eq!(again, first, "the same picture has the same noise");
         assert_clean(&renderer);
         let middle = mean(pixels.iter().copied());
         assert!((middle / clean - 1.0).abs().max_element() < 0.02, "{light}: {middle} for {clean}");
@@ -106,7 +111,7 @@ fn boats_get_the_noise_that_is_asked_for() {
 fn pairs_of_pixels_share_the_noise_of_their_colour() {
     let noise =
         CameraNoise { read: Vec3::splat(1e-3), shot: Vec3::ZERO, together: Vec3::splat(0.6), paired: 1.0 };
-    let (scene, models) = wall(0.6, Some(noise), 3);
+    let (scene, models) = wall(0.6, Some(noise));
     let (mut renderer, mut done) = open(&config(&scene), &models);
     let drawn = on_wall(&submit(&mut renderer, &mut done, &scene, &grey(SIZE.0, SIZE.1, 60)));
     // Of blue, what goes with green is each pixel's own.
@@ -118,4 +123,27 @@ fn pairs_of_pixels_share_the_noise_of_their_colour() {
         (product, square) = (product + a * b, square + 0.5 * (a * a + b * b));
     }
     assert!(product / square > 0.9, "{}", product / square);
+}
+
+#[test]
+fn grain_is_as_large_as_the_pictures_pixels() {
+    let noise = CameraNoise { read: Vec3::splat(1e-3), shot: Vec3::ZERO, together: Vec3::ZERO, paired: 0.0 };
+    let (mut scene, models) = wall(0.6, Some(noise));
+    scene.noise = Some(seen(noise, 0, SIZE.0 / 2));
+    let (mut renderer, mut done) = open(&config(&scene), &models);
+    let drawn = on_wall(&submit(&mut renderer, &mut done, &scene, &grey(SIZE.0, SIZE.1, 60)));
+    assert!(drawn.chunks_exact(2).all(|pair| pair[0] == pair[1]));
+    let own = drawn.chunks_exact(4).filter(|four| four[0] != four[2]).count();
+    assert!(own > drawn.len() / 5, "{own}");
+}
+
+#[test]
+fn noise_that_was_not_prepared_for_is_refused() {
+    let (scene, models) = wall(0.6, None);
+    let mut config = config(&scene);
+    config.needs.noise = false;
+    let (mut renderer, _) = open(&config, &models);
+    let picture = grey(SIZE.0, SIZE.1, 60);
+    let refused = renderer.submit(DrawRequest::new(&scene, &picture, true)).unwrap_err();
+    assert!(refused.to_string().contains("the camera's noise"), "{refused}");
 }

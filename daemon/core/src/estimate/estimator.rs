@@ -6,7 +6,7 @@ use super::{
     attitude::Source,
     clock::ClockReport,
     heading_aiding::HeadingSettings,
-    light::{CameraNoise, Light, LightMeter, Luminaries, SeaTones, SkyAgreement, SkyLight},
+    light::{Light, LightMeter, Luminaries, SeaTones, SeenNoise, SkyAgreement, SkyLight},
     pose::NoPose,
     recoil::RecoilFinder,
     registration::{Misfit, RegistrationChecks},
@@ -71,7 +71,7 @@ pub struct SceneLight {
     /// Luminance that the camera shows as white, cd/m^2.
     pub white_cd_m2: f64,
     /// The camera's noise, where it is seen on boats.
-    pub noise: Option<CameraNoise>,
+    pub noise: Option<SeenNoise>,
 }
 
 /// All that is estimated from devices' reports.

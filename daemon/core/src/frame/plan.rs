@@ -305,6 +305,7 @@ mod tests {
             Some(LeftOut::NoSun)
         );
         let day = SceneNeeds { sun_stays_up: true, ..needs() };
+        assert_eq!(reason(day.clone(), Pass::Noise), Some(LeftOut::Daylight));
         assert_eq!(reason(day, Pass::Lamplight), Some(LeftOut::Daylight));
         assert_eq!(reason(SceneNeeds { belt: 0, ..needs() }, Pass::Rounds), Some(LeftOut::NoRounds));
         let bare = SceneNeeds { phantoms: Phantoms::default(), ..needs() };
@@ -319,6 +320,7 @@ mod tests {
         let frame = plan.frame(&InView { pose_known: true, ..InView::default() });
         assert_eq!(frame[Pass::Video as usize], PassDecision::Run);
         assert_eq!(frame[Pass::Boats as usize], PassDecision::LeftOut(LeftOut::NoBoatInView));
+        assert_eq!(frame[Pass::Noise as usize], PassDecision::LeftOut(LeftOut::NoBoatInView));
         assert_eq!(frame[Pass::Water as usize], PassDecision::LeftOut(LeftOut::NoReflectionInView));
         assert_eq!(frame[Pass::Wake as usize], PassDecision::LeftOut(LeftOut::NoWakeInView));
         assert_eq!(frame[Pass::Rounds as usize], PassDecision::LeftOut(LeftOut::NoRoundInView));

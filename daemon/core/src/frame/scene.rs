@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::{
-    estimate::light::{CameraNoise, Light},
+    estimate::light::{Light, SeenNoise},
     estimate::{
         light::{SeaTones, SkyLight},
         sea::SeaSource,
@@ -63,7 +63,7 @@ pub struct Scene {
     /// How bright the sea is in the picture.
     pub tones: SeaTones,
     /// The camera's noise, where it is seen on boats.
-    pub noise: Option<CameraNoise>,
+    pub noise: Option<SeenNoise>,
     /// The head-up display.
     pub hud: Hud,
     /// The page that it shows instead of counts and state, while a maintainer calibrates.

@@ -18,7 +18,7 @@ pub const ABOUT: About = About {
     what: "Finds the camera's noise by brightness in a picture of the sea, to draw it on boats.",
     truth: "the spread of a simulated camera's picture about the same picture without noise, by brightness: as it comes, and after a JPEG",
     rivals: "Immerkaer's operator over the whole picture (1996), by brightness; the difference of two pictures in a row; the spread about the plane of each patch",
-    why: "Immerkaer's operator is as good where noise is white, at 19 times the time; a JPEG takes half of what it answers to. Waves pass for noise in the other two. The evenest third of the patches of a \
+    why: "Immerkaer's operator is as good where noise is white, at 19 times the time; a JPEG takes half of what it answers to. Waves pass for noise in the other two. The evenest three in ten of the patches of a \
           brightness show noise alone if any do; what choosing them takes off is known. Errors are of green's deviation, rms over eight lights",
 };
 
@@ -191,7 +191,7 @@ pub fn measure(bench: &mut PartBench) -> Result<()> {
             ("all patches", all_patches(&scene.seen)),
         ];
         let mut ways = vec![
-            Way::new("patches", "evenest third", scene.error(&product), 1, || CameraNoise::of(&picture))
+            Way::new("patches", "evenest 3 of 10", scene.error(&product), 1, || CameraNoise::of(&picture))
                 .default_if(true),
         ];
         for (method, table) in &rivals {
@@ -227,7 +227,7 @@ fn extremes(bench: &mut PartBench) -> Result<()> {
         bench.extreme(
             case,
             "codes found",
-            vec![ExtremeResult::product("patches", "evenest third", of(code)?)],
+            vec![ExtremeResult::product("patches", "evenest 3 of 10", of(code)?)],
         );
     }
     Ok(())

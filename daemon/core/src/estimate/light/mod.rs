@@ -12,7 +12,7 @@ mod tones;
 
 pub use dome::{FittedSky, SkyFamily, SkyPixel};
 pub use luminary::{Luminaries, SkyClock};
-pub use noise::{CameraNoise, NoiseMeter};
+pub use noise::{CameraNoise, NoiseMeter, SeenNoise};
 pub use sky::{SKY_SINES, SkyLight};
 pub use tones::{SeaTones, ToneSample};
 
@@ -129,7 +129,7 @@ pub struct LightMeter {
     wants_tones: bool,
     means: Option<(Time, Means)>,
     tones: Option<(Time, SeaTones)>,
-    /// By day no camera has noise that is seen on boats.
+    /// Under a sun that stays up no camera has noise that is seen on boats.
     noise: Option<NoiseMeter>,
 }
 
@@ -179,6 +179,7 @@ impl LightMeter {
     /// Takes in a picture whose camera stood at `camera` with `lens` (the picture's own, not the screen's).
     pub fn observe(&mut self, time: Time, picture: &Picture, lens: &Lens, camera: &CameraPose) {
         self.follow_luminaries(time);
+        self.follow_noise(time, picture);
         if self.wants_tones
             && let Some(seen) = tones(picture, lens, camera)
         {
@@ -205,9 +206,17 @@ impl LightMeter {
             }
         };
         self.means = Some((time, means));
-        let on_level = self.light().on_level();
-        if let Some(noise) = &mut self.noise {
-            noise.observe(time, picture, on_level);
+    }
+
+    /// Looks at the camera's noise, unless the sun is well up.
+    fn follow_noise(&mut self, time: Time, picture: &Picture) {
+        /// Sine of the sun's elevation from which it is day under every cloud.
+        const DAY_ABOVE: f64 = 0.1;
+        let (is_day, on_level) = (self.luminaries().sun.z > DAY_ABOVE, self.light().on_level());
+        match &mut self.noise {
+            Some(noise) if is_day => *noise = NoiseMeter::default(),
+            Some(noise) => noise.observe(time, picture, on_level),
+            None => {}
         }
     }
 
@@ -277,7 +286,7 @@ impl LightMeter {
     }
 
     /// The camera's noise, where it is seen on boats.
-    pub fn noise(&self) -> Option<CameraNoise> {
+    pub fn noise(&self) -> Option<SeenNoise> {
         self.noise.as_ref().and_then(NoiseMeter::seen)
     }
 
@@ -441,6 +450,21 @@ mod tests {
         // Dusk, an overcast day, a night.
         for (sine, code) in [(-0.08, 200), (0.3, 90), (-0.5, 60), (0.02, 20)] {
             assert_eq!(of(sine, code), SkyAgreement::Plausible, "{sine} {code}");
+        }
+    }
+
+    #[test]
+    fn noise_is_looked_for_by_night_even_where_nothing_but_sea_is_seen() {
+        let lens = Lens::pinhole(96, 96, 0.5);
+        let camera = CameraPose { world_from_camera: look(0.0, -0.9, 0.0), position: DVec3::Z };
+        // Checks of 12 codes pass for noise.
+        let code = |i: u32| 60 + 12 * (i.wrapping_mul(2_654_435_761) >> 31) as u8;
+        let bytes: Vec<u8> = (0..96 * 96).flat_map(|i| [code(i); 3]).collect();
+        let grainy = Picture::new(PixelFormat::Rgb, 96, 96, bytes.into()).unwrap();
+        for (sine, is_seen) in [(-0.3, true), (0.3, false)] {
+            let mut meter = meter(DVec3::new(1.0, 0.0, sine).normalize(), false);
+            meter.observe(Time::from_ns(0), &grainy, &lens, &camera);
+            assert_eq!(meter.noise().is_some(), is_seen, "{sine}");
         }
     }
 

@@ -22,8 +22,8 @@ const GROUPS: usize = 8;
 const EVEN: f32 = 0.3;
 /// Steps from pixel to pixel of the operator.
 const STEPS: [usize; 2] = [1, 3];
-/// Mean of what the operator with these steps finds in the evenest patches of white noise, over its variance: so much less noise than they have do patches show that
-/// were chosen for showing little, where nothing else tells them apart. From 4000 patches of random numbers.
+/// Mean of what the operator with these steps finds in the evenest patches of white noise, over its variance. They were chosen for showing little, and
+/// show less noise than they have. From 4000 patches of random numbers.
 const EVEN_MEAN: [f32; 2] = [0.737, 0.656];
 /// What neighbours find over what pixels farther apart do: noise is smoothed below the first, and is not above the second.
 const SMOOTHED: [f32; 2] = [0.35, 0.7];
@@ -34,14 +34,21 @@ const ROUNDED: f32 = 1.0 / (12.0 * 255.0 * 255.0);
 
 /// Fewest patches that say something.
 const PATCHES_MIN: usize = 4 * GROUPS;
+/// Share of a patch's pixels that may be black or white: beyond these noise is cut off.
+const CUT_OFF: f32 = 0.2;
+/// A patch of whose pixels this share is the same as the next was not seen by a camera, or its noise was coded away.
+const FLAT: f32 = 0.25;
+/// No group's variance counts as less than this part of the middle one's: a few flat patches would outweigh all others.
+const LEAST: f32 = 0.05;
 /// Least time between two looks at the noise, seconds; and the time constant with which they are followed.
 const LOOK_EVERY_S: f64 = 0.5;
 const FOLLOW_S: f64 = 4.0;
 
 /// Noise of so many codes, 0 to 255, is seen on a boat, and of so many no more.
 const SEEN: [f32; 2] = [2.2, 1.8];
-/// A boat's albedo, at which that is asked.
+/// A boat's albedo, at which that is asked; and a light at which it is asked whatever sky and sun give: lamps may shine.
 const ALBEDO: f32 = 0.2;
+const LAMPLIT: f32 = 0.05;
 
 /// The noise of one picture by brightness.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +64,9 @@ pub struct CameraNoise {
 }
 
 impl CameraNoise {
+    /// A picture without noise.
+    const NONE: Self = Self { read: Vec3::ZERO, shot: Vec3::ZERO, together: Vec3::ZERO, paired: 0.0 };
+
     /// Standard deviation at a light, linear.
     pub fn deviation(&self, light: Vec3) -> Vec3 {
         let variance = self.read + self.shot * light.max(Vec3::ZERO);
@@ -68,9 +78,10 @@ impl CameraNoise {
         self.paired > PAIRED
     }
 
-    /// Looks at the patches of a picture; `None` where it has too few pixels.
+    /// Looks at the patches of a picture. No noise where nearly all of them are flat; `None` where too few are neither black nor white.
     pub fn of(picture: &Picture) -> Option<Self> {
         let mut patches = Vec::with_capacity((PATCHES.0 * PATCHES.1) as usize);
+        let mut flat = 0;
         let side = SIDE as u32;
         if picture.width().min(picture.height()) < 4 * side {
             return None;
@@ -81,16 +92,20 @@ impl CameraNoise {
                 // Whole pairs of pixels: two may share their colour.
                 let x = (width * (2 * column + 1) / (2 * PATCHES.0)) & !1;
                 let y = (height * (2 * row + 1) / (2 * PATCHES.1)) & !1;
-                patches.extend(Patch::of(picture, x, y));
+                match Patch::of(picture, x, y) {
+                    Look::Seen(patch) => patches.push(patch),
+                    Look::Flat => flat += 1,
+                    Look::CutOff => {}
+                }
             }
         }
-        Self::of_patches(patches)
+        if patches.len() < PATCHES_MIN {
+            return (patches.len() + flat >= PATCHES_MIN).then_some(Self::NONE);
+        }
+        Some(Self::of_patches(patches))
     }
 
-    fn of_patches(mut patches: Vec<Patch>) -> Option<Self> {
-        if patches.len() < PATCHES_MIN {
-            return None;
-        }
+    fn of_patches(mut patches: Vec<Patch>) -> Self {
         patches.sort_by(|a, b| a.mean.y.total_cmp(&b.mean.y));
         let each = patches.len().div_ceil(GROUPS);
         let [near, wide] = [0, 1].map(|step| {
@@ -106,19 +121,20 @@ impl CameraNoise {
         let paired = (1.0 - within / between.max(1e-12)).clamp(0.0, 1.0);
         let near_share = near_share(&near, &wide) * if paired > PAIRED { Vec3::Y } else { Vec3::ONE };
         let even: Vec<Even> = near.iter().zip(&wide).map(|(n, w)| w.towards(n, near_share)).collect();
-        let mut made = Self { read: Vec3::ZERO, shot: Vec3::ZERO, together: Vec3::ZERO, paired };
+        let mut made = Self { paired, ..Self::NONE };
         for channel in 0..3 {
             let points = even.iter().map(|e| (e.mean[channel], e.noise[channel]));
             (made.read[channel], made.shot[channel]) = fit(points);
         }
-        // Each group counts alike, whatever its brightness: parts of its own variance.
+        // Each group that shows noise counts alike, whatever its brightness: parts of its own variance.
+        let shown = even.iter().filter(|e| e.found.variance.min_element() > 2.0 * ROUNDED);
         let parts = |e: &Even| {
-            let [r, g, b] = e.found.variance.map(|v| v.max(1e-12).sqrt()).to_array();
+            let [r, g, b] = (e.found.variance - ROUNDED).map(f32::sqrt).to_array();
             e.found.product / Vec3::new(g * r, g * b, r * b)
         };
-        made.together =
-            (even.iter().map(parts).sum::<Vec3>() / even.len() as f32).clamp(-Vec3::ONE, Vec3::ONE);
-        Some(made)
+        let (sum, count) = shown.fold((Vec3::ZERO, 0.0), |(sum, count), e| (sum + parts(e), count + 1.0));
+        made.together = (sum / f32::max(count, 1.0)).clamp(-Vec3::ONE, Vec3::ONE);
+        made
     }
 
     fn towards(&self, other: &Self, share: f32) -> Self {
@@ -130,11 +146,25 @@ impl CameraNoise {
         }
     }
 
-    /// Deviation of the green code, 0 to 255, of a matt grey boat under a light.
+    /// Deviation of the green code, 0 to 255, of a matt grey boat under sky and sun or a lamp, whichever shows more.
     fn codes_on_boat(&self, on_level: Vec3) -> f32 {
-        let light = ALBEDO * on_level.dot(LUMINANCE);
-        255.0 * self.deviation(Vec3::splat(light)).y / light_a_code(linear_to_srgb(light.clamp(0.0, 1.0)))
+        let codes = |light: f32| {
+            let light = light.clamp(0.0, 1.0);
+            255.0 * self.deviation(Vec3::splat(light)).y / light_a_code(linear_to_srgb(light))
+        };
+        codes(ALBEDO * on_level.dot(LUMINANCE)).max(codes(LAMPLIT))
     }
+}
+
+/// The noise of the newest picture, where it is seen on boats.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeenNoise {
+    /// The noise.
+    pub noise: CameraNoise,
+    /// The picture's number: each has other noise.
+    pub picture: u32,
+    /// The picture's width, pixels.
+    pub width: u32,
 }
 
 /// Follows the noise of the pictures.
@@ -143,11 +173,14 @@ pub struct NoiseMeter {
     found: Option<(Time, CameraNoise)>,
     looked: Option<Time>,
     is_seen: bool,
+    pictures: u32,
+    width: u32,
 }
 
 impl NoiseMeter {
     /// Takes in a picture in which `on_level` is the radiance of a white matt surface that lies level.
     pub fn observe(&mut self, time: Time, picture: &Picture, on_level: Vec3) {
+        (self.pictures, self.width) = (self.pictures.wrapping_add(1), picture.width());
         if self.looked.is_some_and(|looked| (0.0..LOOK_EVERY_S).contains(&time.secs_since(looked))) {
             return;
         }
@@ -165,8 +198,9 @@ impl NoiseMeter {
     }
 
     /// The noise, where it is seen on boats.
-    pub fn seen(&self) -> Option<CameraNoise> {
-        self.found.filter(|_| self.is_seen).map(|(_, noise)| noise)
+    pub fn seen(&self) -> Option<SeenNoise> {
+        let (_, noise) = self.found.filter(|_| self.is_seen)?;
+        Some(SeenNoise { noise, picture: self.pictures, width: self.width })
     }
 }
 
@@ -216,6 +250,15 @@ impl Found {
     }
 }
 
+/// A look at a patch.
+enum Look {
+    Seen(Patch),
+    /// Machines have made it so.
+    Flat,
+    /// Much of it is black or white.
+    CutOff,
+}
+
 /// One patch of a picture.
 #[derive(Clone, Copy, Debug)]
 struct Patch {
@@ -228,11 +271,19 @@ struct Patch {
 }
 
 impl Patch {
-    /// The patch whose upper left pixel is at `x` and `y`; `None` where it touches white, beyond which noise is cut off.
-    fn of(picture: &Picture, x: u32, y: u32) -> Option<Self> {
+    /// The patch whose upper left pixel is at `x` and `y`.
+    fn of(picture: &Picture, x: u32, y: u32) -> Look {
         let mut codes = [Vec3::ZERO; PIXELS];
         for (i, code) in codes.iter_mut().enumerate() {
             *code = Vec3::from(picture.srgb_at(x + (i % SIDE) as u32, y + (i / SIDE) as u32));
+        }
+        let is_cut = |code: &&Vec3| code.min_element() <= 0.0 || code.max_element() >= 1.0;
+        if codes.iter().filter(is_cut).count() as f32 > CUT_OFF * PIXELS as f32 {
+            return Look::CutOff;
+        }
+        let same = codes.windows(2).filter(|pair| pair[0] == pair[1]).count();
+        if same as f32 > FLAT * PIXELS as f32 {
+            return Look::Flat;
         }
         let mean = codes.iter().sum::<Vec3>() / PIXELS as f32;
         let mut colour = [0.0; 2];
@@ -242,8 +293,7 @@ impl Patch {
         }
         // There is a pair more than steps between pairs in each row.
         colour[0] *= (SIDE / 2 - 1) as f32 / (SIDE / 2) as f32;
-        let found = || STEPS.map(|step| Found::of(&codes, step));
-        (mean.max_element() < 0.97).then(|| Self { mean, found: found(), colour })
+        Look::Seen(Self { mean, found: STEPS.map(|step| Found::of(&codes, step)), colour })
     }
 }
 
@@ -313,10 +363,14 @@ fn light_a_code(code: f32) -> f32 {
         / (code + STEP - (code - STEP).max(0.0))
 }
 
-/// Read and shot noise, neither below nothing, that fit variances by light; each point counts by the share that it is off.
+/// Read and shot noise, neither below nothing, that fit variances by light with least relative error.
 fn fit(points: impl Iterator<Item = (f32, f32)> + Clone) -> (f32, f32) {
+    let mut variances: Vec<f32> = points.clone().map(|(_, variance)| variance).collect();
+    variances.sort_by(f32::total_cmp);
+    let middle = variances.get(variances.len() / 2).copied().unwrap_or_default();
+    let least = f64::from((LEAST * middle).max(1e-10));
     let weighed =
-        || points.clone().map(|(light, variance)| (f64::from(light), f64::from(variance).max(1e-10)));
+        || points.clone().map(|(light, variance)| (f64::from(light), f64::from(variance).max(least)));
     let (mut aa, mut ab, mut bb, mut a, mut b) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for (light, variance) in weighed() {
         let row = DVec2::new(1.0, light) / variance;
@@ -418,6 +472,23 @@ mod tests {
     }
 
     #[test]
+    fn what_is_flat_or_cut_off_says_nothing() {
+        let mut random = Pcg32::seed_from_u64(6);
+        let seen = picture(&NIGHT, 0.0, |_, _| Vec3::from_array([(); 3].map(|()| normal(&mut random))));
+        let row = 3 * seen.width() as usize;
+        // Bars above and below, as of a film; white above, black below.
+        for [above, below] in [[16, 16], [1, 90], [255, 0]] {
+            let mut bytes = seen.bytes().to_vec();
+            bytes[..40 * row].fill(above);
+            bytes[200 * row..].fill(below);
+            let barred = Picture::new(PixelFormat::Rgb, seen.width(), seen.height(), bytes.into()).unwrap();
+            let off = worst(&CameraNoise::of(&barred).unwrap(), &NIGHT);
+            // A third fewer patches, and some at the edge.
+            assert!(off < 0.15, "{above}, {below}: {off}");
+        }
+    }
+
+    #[test]
     fn noise_is_followed_and_shown_while_it_is_seen() {
         let mut random = Pcg32::seed_from_u64(5);
         let mut one = |_: u32, _: u32| Vec3::from_array([(); 3].map(|()| normal(&mut random)));
@@ -431,7 +502,11 @@ mod tests {
         for i in 0..40 {
             meter.observe(at(1.0 + 0.5 * f64::from(i)), &dark, on_level);
         }
-        assert!(worst(&meter.seen().unwrap(), &NIGHT) < 0.15);
+        let seen = meter.seen().unwrap();
+        assert!(worst(&seen.noise, &NIGHT) < 0.15);
+        // The next picture has other noise, whether it is looked at or not.
+        meter.observe(at(20.6), &dark, on_level);
+        assert_ne!(meter.seen().unwrap().picture, seen.picture);
         for i in 0..40 {
             meter.observe(at(30.0 + 0.5 * f64::from(i)), &bright, on_level);
         }
@@ -442,8 +517,10 @@ mod tests {
     fn pictures_that_say_nothing_and_extreme_ones_stay_finite() {
         let small = Picture::new(PixelFormat::Rgb, 8, 8, vec![9; 192].into()).unwrap();
         assert_eq!(CameraNoise::of(&small), None);
-        let white = Picture::new(PixelFormat::Rgb, 64, 64, vec![255; 64 * 64 * 3].into()).unwrap();
-        assert_eq!(CameraNoise::of(&white), None);
+        for (code, expected) in [(255, None), (0, None), (90, Some(CameraNoise::NONE))] {
+            let even = Picture::new(PixelFormat::Rgb, 64, 64, vec![code; 64 * 64 * 3].into()).unwrap();
+            assert_eq!(CameraNoise::of(&even), expected, "{code}");
+        }
         for bytes in
             [vec![0; 64 * 64 * 3], (0..64 * 64 * 3).map(|i| if i % 2 == 0 { 0 } else { 255 }).collect()]
         {

@@ -222,7 +222,7 @@ impl BoatsPass {
     }
 
     /// Puts the layer onto the screen, within a rendering to it: the first `pieces` rectangles of the frame's list, which do not
-    /// overlap. With the camera's noise where it is `noisy` and was asked for before.
+    /// overlap. With the camera's noise where they are `noisy`, which was prepared for.
     pub(crate) fn record_composite(
         &self,
         to: CommandEncoder<'_>,

@@ -218,7 +218,7 @@ impl ShadowPlan {
     }
 }
 
-/// Lowest and highest place at which a boat's texels are looked up: those about what is nearer to the edge are another's.
+/// Lowest and highest place at which a boat's texels are looked up. A look-up takes four texels: nearer to the edge some of them are another's.
 fn texels(placed: &Placed) -> [f32; 4] {
     const EDGE: u32 = 1;
     let PixelRect { x, y, width, height } = placed.place;
