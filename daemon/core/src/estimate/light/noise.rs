@@ -446,8 +446,10 @@ mod tests {
             let seen = picture(&NIGHT, waves, |_, _| Vec3::from_array([(); 3].map(|()| normal(&mut random))));
             let found = CameraNoise::of(&seen).unwrap();
             let off = worst(&found, &NIGHT);
-            println!("{waves} codes of waves: {off:.3} off, {found:?}");
-            assert!(off < if waves > 0.0 { 0.2 } else { 0.12 }, "{off}");
+            assert!(
+                off < if waves > 0.0 { 0.2 } else { 0.12 },
+                "{waves} codes of waves: {off:.3} off, {found:?}"
+            );
             assert!(found.together.abs().max_element() < 0.25 && found.paired < 0.3, "{found:?}");
         }
     }
