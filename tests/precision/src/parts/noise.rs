@@ -112,7 +112,7 @@ impl Scene {
     }
 }
 
-/// What is found at the nearest light.
+/// Deviation that is found at the nearest light.
 fn nearest(found: &[(f32, f32)], light: f32) -> f32 {
     let off = |p: &&(f32, f32)| (linear_to_srgb(p.0) - linear_to_srgb(light)).abs();
     found.iter().min_by(|a, b| off(a).total_cmp(&off(b))).map_or(0.0, |p| p.1)

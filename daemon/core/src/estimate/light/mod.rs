@@ -12,11 +12,12 @@ mod tones;
 
 pub use dome::{FittedSky, SkyFamily, SkyPixel};
 pub use luminary::{Luminaries, SkyClock};
-pub use noise::{CameraNoise, NoiseMeter, SeenNoise};
+pub use noise::{CameraNoise, SeenNoise};
 pub use sky::{SKY_SINES, SkyLight};
 pub use tones::{SeaTones, ToneSample};
 
 use glam::{DVec2, DVec3, Vec3};
+use noise::NoiseMeter;
 
 use crate::{
     colour::{LUMINANCE, srgb_to_linear},
@@ -34,6 +35,9 @@ const FOLLOW_S: f64 = 1.0;
 /// Luminance of white in the picture of a camera at its utmost, cd/m^2: 30 pictures a second at f/1.4 with pixels of 2.9 um and a gain of 30 dB
 /// collect 700 electrons for 1 cd/m^2, of 375 that are white then.
 const WHITE_LEAST_CD_M2: f64 = 0.5;
+
+/// Sine of the sun's elevation from which it is day under every cloud.
+const DAY_ABOVE: f64 = 0.1;
 
 /// Pixels sampled along the picture's width and height.
 const GRID: (u32, u32) = (24, 18);
@@ -185,7 +189,7 @@ impl LightMeter {
         {
             let seen = match self.tones {
                 None => seen,
-                Some((since, old)) => old.towards(&seen, follow(since, time)),
+                Some((since, old)) => old.towards(&seen, follow(since, time, FOLLOW_S)),
             };
             self.tones = Some((time, seen));
         }
@@ -197,7 +201,7 @@ impl LightMeter {
         let means = match self.means {
             None => seen,
             Some((since, old)) => {
-                let share = follow(since, time);
+                let share = follow(since, time, FOLLOW_S);
                 Means {
                     sky: old.sky.lerp(seen.sky, share),
                     horizon: old.horizon.lerp(seen.horizon, share),
@@ -210,8 +214,6 @@ impl LightMeter {
 
     /// Looks at the camera's noise, unless the sun is well up.
     fn follow_noise(&mut self, time: Time, picture: &Picture) {
-        /// Sine of the sun's elevation from which it is day under every cloud.
-        const DAY_ABOVE: f64 = 0.1;
         let (is_day, on_level) = (self.luminaries().sun.z > DAY_ABOVE, self.light().on_level());
         match &mut self.noise {
             Some(noise) if is_day => *noise = NoiseMeter::default(),
@@ -232,7 +234,7 @@ impl LightMeter {
         self.sky = Some(match self.sky {
             None => FollowedSky { fitted: time, dome: fitted.lobes, sun, per_cd_m2 },
             Some(old) => {
-                let share = follow(old.fitted, time);
+                let share = follow(old.fitted, time, FOLLOW_S);
                 let dome = old.dome.towards(&fitted.lobes, share);
                 let per_cd_m2 = old.per_cd_m2 + (per_cd_m2 - old.per_cd_m2) * f64::from(share);
                 FollowedSky { fitted: time, dome, sun: old.sun.lerp(sun, share), per_cd_m2 }
@@ -242,9 +244,8 @@ impl LightMeter {
 
     /// Agreement of the sky in the pictures with the sun's elevation; `None` before a sky was seen.
     pub fn agreement(&self) -> Option<SkyAgreement> {
-        /// Sines of the sun's elevation at the end of civil twilight, and above which it is day under every cloud.
+        /// Sine of the sun's elevation at the end of civil twilight.
         const NIGHT_BELOW: f64 = -0.1045;
-        const DAY_ABOVE: f64 = 0.1;
         /// Radiance of a sky by day, that no camera makes of a night's, and of one that is none by day, over that of white.
         const BRIGHT: f32 = 0.2;
         const DARK: f32 = 0.01;
@@ -320,9 +321,9 @@ impl LightMeter {
     }
 }
 
-/// Share of the way that the estimate goes to what is seen at `time`.
-fn follow(since: Time, time: Time) -> f32 {
-    (1.0 - (-time.secs_since(since).max(0.0) / FOLLOW_S).exp()) as f32
+/// Share of the way that an estimate of that time constant, seconds, goes to what is seen at `time`.
+fn follow(since: Time, time: Time, constant_s: f64) -> f32 {
+    (1.0 - (-time.secs_since(since).max(0.0) / constant_s).exp()) as f32
 }
 
 /// Sea is looked at from this far below the horizontal, tangent: what is nearer the horizon is haze and other boats.

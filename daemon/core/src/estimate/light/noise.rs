@@ -6,6 +6,7 @@
 
 use glam::{DVec2, Vec3};
 
+use super::follow;
 use crate::{
     colour::{LUMINANCE, linear_to_srgb, srgb_to_linear},
     event::Picture,
@@ -25,7 +26,7 @@ const STEPS: [usize; 2] = [1, 3];
 /// Mean of what the operator with these steps finds in the evenest patches of white noise, over its variance. They were chosen for showing little, and
 /// show less noise than they have. From 4000 patches of random numbers.
 const EVEN_MEAN: [f32; 2] = [0.737, 0.656];
-/// What neighbours find over what pixels farther apart do: noise is smoothed below the first, and is not above the second.
+/// Ratios of the variance that neighbours find to that of pixels farther apart: noise is smoothed below the first, and is not above the second.
 const SMOOTHED: [f32; 2] = [0.35, 0.7];
 /// Two pixels share their colour from this on.
 const PAIRED: f32 = 0.5;
@@ -73,7 +74,7 @@ impl CameraNoise {
         variance.map(|variance| variance.max(0.0).sqrt())
     }
 
-    /// Whether two pixels share the noise of their colour.
+    /// True where two pixels share the noise of their colour.
     pub fn is_paired(&self) -> bool {
         self.paired > PAIRED
     }
@@ -188,10 +189,7 @@ impl NoiseMeter {
         let Some(seen) = CameraNoise::of(picture) else { return };
         let noise = match self.found {
             None => seen,
-            Some((since, old)) => {
-                let share = 1.0 - (-time.secs_since(since).max(0.0) / FOLLOW_S).exp();
-                old.towards(&seen, share as f32)
-            }
+            Some((since, old)) => old.towards(&seen, follow(since, time, FOLLOW_S)),
         };
         self.found = Some((time, noise));
         self.is_seen = noise.codes_on_boat(on_level) > SEEN[usize::from(self.is_seen)];
@@ -204,7 +202,7 @@ impl NoiseMeter {
     }
 }
 
-/// What the operator finds in a patch: variances of codes.
+/// Variances of codes that the operator finds in a patch.
 #[derive(Clone, Copy, Debug, Default)]
 struct Found {
     /// Of luma, by which patches are taken for even or not.
@@ -264,7 +262,7 @@ enum Look {
 struct Patch {
     /// Its mean code.
     mean: Vec3,
-    /// What the operator finds, by its steps.
+    /// Findings of the operator, by its steps.
     found: [Found; 2],
     /// Squares of the step of blue less green from a pixel to the next: within a pair of pixels that may share it, and from pair to pair.
     colour: [f32; 2],

@@ -225,7 +225,7 @@ fn texels(placed: &Placed) -> [f32; 4] {
     [x + EDGE, y + EDGE, x + width - EDGE, y + height - EDGE].map(|texel| texel as f32)
 }
 
-/// What [`SunView::rows`] finds, to clip space.
+/// Rows of [`SunView::rows`], to clip space.
 fn clip(rows: [[f64; 4]; 3]) -> [[f32; 4]; 3] {
     let spans = [f64::from(MAP.0), f64::from(MAP.1)];
     let mut clip = rows;
