@@ -33,6 +33,12 @@ impl Time {
         self.0.saturating_sub(earlier.0)
     }
 
+    /// Share, 0 to 1, of the way to its input that a first-order low-pass filter goes from `earlier` to `self`, where its time
+    /// constant is `constant_s` seconds. 0 where `self` is not later.
+    pub fn smoothing_since(self, earlier: Self, constant_s: f64) -> f32 {
+        -(-self.secs_since(earlier).max(0.0) / constant_s).exp_m1() as f32
+    }
+
     /// The instant `ns` nanoseconds later (earlier where negative).
     #[must_use]
     pub const fn plus_ns(self, ns: i64) -> Self {

@@ -189,7 +189,7 @@ impl LightMeter {
         {
             let seen = match self.tones {
                 None => seen,
-                Some((since, old)) => old.towards(&seen, follow(since, time, FOLLOW_S)),
+                Some((since, old)) => old.towards(&seen, time.smoothing_since(since, FOLLOW_S)),
             };
             self.tones = Some((time, seen));
         }
@@ -201,7 +201,7 @@ impl LightMeter {
         let means = match self.means {
             None => seen,
             Some((since, old)) => {
-                let share = follow(since, time, FOLLOW_S);
+                let share = time.smoothing_since(since, FOLLOW_S);
                 Means {
                     sky: old.sky.lerp(seen.sky, share),
                     horizon: old.horizon.lerp(seen.horizon, share),
@@ -234,7 +234,7 @@ impl LightMeter {
         self.sky = Some(match self.sky {
             None => FollowedSky { fitted: time, dome: fitted.lobes, sun, per_cd_m2 },
             Some(old) => {
-                let share = follow(old.fitted, time, FOLLOW_S);
+                let share = time.smoothing_since(old.fitted, FOLLOW_S);
                 let dome = old.dome.towards(&fitted.lobes, share);
                 let per_cd_m2 = old.per_cd_m2 + (per_cd_m2 - old.per_cd_m2) * f64::from(share);
                 FollowedSky { fitted: time, dome, sun: old.sun.lerp(sun, share), per_cd_m2 }
@@ -319,11 +319,6 @@ impl LightMeter {
         let level = dome.on_level().max(Vec3::ZERO) / std::f32::consts::PI;
         Light { sun_direction: self.luminaries().brightest(), sun, sky: level, dome, horizon, sea }
     }
-}
-
-/// Share of the way that an estimate of that time constant, seconds, goes to what is seen at `time`.
-fn follow(since: Time, time: Time, constant_s: f64) -> f32 {
-    (1.0 - (-time.secs_since(since).max(0.0) / constant_s).exp()) as f32
 }
 
 /// Sea is looked at from this far below the horizontal, tangent: what is nearer the horizon is haze and other boats.

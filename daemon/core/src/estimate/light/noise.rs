@@ -6,7 +6,6 @@
 
 use glam::{DVec2, Vec3};
 
-use super::follow;
 use crate::{
     colour::{LUMINANCE, linear_to_srgb, srgb_to_linear},
     event::Picture,
@@ -189,7 +188,7 @@ impl NoiseMeter {
         let Some(seen) = CameraNoise::of(picture) else { return };
         let noise = match self.found {
             None => seen,
-            Some((since, old)) => old.towards(&seen, follow(since, time, FOLLOW_S)),
+            Some((since, old)) => old.towards(&seen, time.smoothing_since(since, FOLLOW_S)),
         };
         self.found = Some((time, noise));
         self.is_seen = noise.codes_on_boat(on_level) > SEEN[usize::from(self.is_seen)];
