@@ -26,7 +26,7 @@ use crate::{
     geometry::CameraPose,
     time::Time,
     water::ReflectionMethod,
-    world::{BoreAim, World, exercise::ExerciseEvent, score::ShotRecord},
+    world::{BoreAim, World, exercise::ExerciseEvent, score::ShotRecord, track::TrackBlock},
 };
 
 pub use crate::frame::{LIGHTS_A_BOAT, ROUNDS_SEEN_MAX};
@@ -46,6 +46,7 @@ pub struct Session {
     faults: FaultBoard,
     records: Vec<ShotRecord>,
     happened: Vec<ExerciseEvent>,
+    tracks: TrackBlock,
     found: Vec<FaultChange>,
     notes: Notes,
     digest: SessionDigest,
@@ -90,6 +91,7 @@ impl Session {
             faults: FaultBoard::new(),
             records: Vec::new(),
             happened: Vec::new(),
+            tracks: TrackBlock::default(),
             found: Vec::new(),
             notes: Notes::default(),
             digest: SessionDigest::default(),
@@ -204,6 +206,7 @@ impl Session {
     pub fn tick(&mut self, tick: Tick) -> TickAnswer<'_> {
         self.records.clear();
         self.happened.clear();
+        self.tracks.clear();
         self.found.clear();
         self.notes.clear();
         let picture_is_new = self.estimator.look(!self.faults.is_active(Fault::LoadUnseen));
@@ -242,6 +245,7 @@ impl Session {
             view,
             records: &self.records,
             events: &self.happened,
+            tracks: &self.tracks,
             faults: &self.found,
             notes: self.notes.new_ones(),
         }
@@ -261,6 +265,22 @@ impl Session {
         let aim = |fired| aim(calibration, estimator, composer.scene().camera, faults, fired);
         world.advance(video_time, until, known, aim, records);
         self.happened.extend_from_slice(self.world.events());
+        self.take_tracks();
+    }
+
+    /// Takes over the world's tracks, and fills in where the camera was.
+    fn take_tracks(&mut self) {
+        let Self { tracks, world, estimator, .. } = self;
+        tracks.append(world.tracks());
+        for sample in &mut tracks.samples {
+            let camera = estimator.camera(Time::from_ns(sample.time_ns));
+            sample.camera = camera.ok().map(|camera| camera.pose.into());
+        }
+    }
+
+    /// Tracks of boats, rounds and gun that the last tick, or the end, added.
+    pub const fn tracks(&self) -> &TrackBlock {
+        &self.tracks
     }
 
     /// The warning that the sailor sees, of all that there are: that the picture is late comes before what does not change it.
@@ -339,7 +359,9 @@ impl Session {
     /// Rounds still in the air are recorded as misses: the session ends here. Gives these, and what else the score needs.
     pub fn finish(&mut self) -> (&[ShotRecord], &[ExerciseEvent]) {
         self.records.clear();
+        self.tracks.clear();
         self.world.finish(&mut self.records);
+        self.take_tracks();
         self.digest_records();
         (&self.records, self.world.events())
     }

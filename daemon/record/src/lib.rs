@@ -8,9 +8,10 @@ pub mod recording;
 pub mod space;
 
 pub use journal::{
-    DirtyEnd, DirtyRun, Journal, JournalError, JournalFault, JournalOptions, JournalSummary, Quarantine, Run,
-    RunSelection, ShotFilter, StoredEvent, StoredRun, StoredShot, Unwritten, boot_id, put_aside, read_events,
-    read_runs, read_shots, side_files,
+    BoatDetails, CameraDetails, DirtyEnd, DirtyRun, Journal, JournalError, JournalFault, JournalOptions,
+    JournalSummary, Quarantine, Run, RunDetails, RunSelection, ShotFilter, StoredEvent, StoredRun,
+    StoredShot, StoredTracks, Unwritten, boot_id, put_aside, read_events, read_runs, read_shots, read_tracks,
+    side_files,
 };
 pub use recording::{
     CameraInfo, Counts, Entries, Entry, FaultEntry, FrameEntry, PictureEntry, PoseEntry, Properties,

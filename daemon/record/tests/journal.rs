@@ -16,11 +16,12 @@ use bowwave_core::{
     world::{
         scenario::Side,
         score::{NotScored, Outcome, ShotRecord},
+        track::{PathPoint, RoundPath, TrackBlock, TrackPose, TrackSample},
     },
 };
 use bowwave_record::{
-    DirtyEnd, Journal, JournalError, JournalOptions, Run, RunSelection, ShotFilter, StoredShot, boot_id,
-    read_runs, read_shots,
+    DirtyEnd, Journal, JournalError, JournalOptions, Run, RunDetails, RunSelection, ShotFilter, StoredShot,
+    StoredTracks, boot_id, read_runs, read_shots, read_tracks,
 };
 use glam::DVec3;
 use proptest::prelude::*;
@@ -34,6 +35,7 @@ fn run() -> Run {
         version: "0.1.0".to_owned(),
         boot_id: Some("2d1c7b3a-0000-4000-8000-000000000001".to_owned()),
         started: Some(Time::from_ns(4_000_000_000)),
+        details: Some("{}".to_owned()),
     }
 }
 
@@ -207,9 +209,9 @@ fn what_is_no_journal_is_named_and_left_alone() {
 
     let path = folder.path().join("newer.db");
     shoot(&path, &[shot(1)]);
-    rusqlite::Connection::open(&path).unwrap().execute_batch("PRAGMA user_version = 5").unwrap();
+    rusqlite::Connection::open(&path).unwrap().execute_batch("PRAGMA user_version = 6").unwrap();
     let error = Journal::open(&path, &run()).err().unwrap();
-    assert!(matches!(error, JournalError::Newer { found: 5, supported: 4, .. }), "{error}");
+    assert!(matches!(error, JournalError::Newer { found: 6, supported: 5, .. }), "{error}");
     assert!(matches!(read_runs(&path), Err(JournalError::Newer { .. })));
 
     let error = Journal::open(folder.path(), &run()).err().unwrap();
@@ -519,5 +521,54 @@ proptest! {
         shoot(&path, &shots);
         let found: Vec<ShotRecord> = all(&path).into_iter().map(|stored| stored.record).collect();
         prop_assert_eq!(found, shots);
+    }
+}
+
+fn block(second: i64) -> TrackBlock {
+    let pose = |x: f32| TrackPose { position: [x, 200.5, -0.25], attitude: [0.0, 0.0, 0.0, 1.0] };
+    let sample = |i: i64| TrackSample {
+        time_ns: second * 1_000_000_000 + i * 100_000_000,
+        camera: (i != 3).then(|| pose(0.0)),
+        boats: vec![Some(pose(i as f32)), None],
+    };
+    let point = PathPoint { after_s: 0.1, position: [1.0, 80.0, 5.5], velocity: [0.0, 800.0, -1.0] };
+    let path = RoundPath { shot: second.cast_unsigned(), fired_ns: second, points: vec![point; 3] };
+    TrackBlock { samples: (0..10).map(sample).collect(), rounds: vec![path] }
+}
+
+#[test]
+fn tracks_come_back_as_they_were_and_gaps_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hits.db");
+    let journal = Journal::open(&path, &run()).unwrap();
+    let mut expected = TrackBlock::default();
+    for second in [1, 2, 5] {
+        journal.tracks(second, block(second.cast_signed())).unwrap();
+        expected.append(&block(second.cast_signed()));
+    }
+    journal.finish().unwrap();
+    let stored = read_tracks(&path, RunSelection::Latest).unwrap();
+    assert_eq!((&stored.tracks, stored.missing), (&expected, 2));
+    assert_eq!(read_runs(&path).unwrap()[0].run.details.as_deref(), Some("{}"));
+    // One that is damaged is a gap, and the others stay.
+    rusqlite::Connection::open(&path)
+        .unwrap()
+        .execute("UPDATE tracks SET block = x'93ff00' WHERE number = 2", [])
+        .unwrap();
+    let damaged = read_tracks(&path, RunSelection::Run(1)).unwrap();
+    assert_eq!((damaged.tracks.samples.len(), damaged.missing), (20, 3));
+    // A run that has none.
+    Journal::open(&path, &run()).unwrap().finish().unwrap();
+    assert_eq!(read_tracks(&path, RunSelection::Latest).unwrap(), StoredTracks::default());
+}
+
+#[test]
+fn details_of_runs_are_read_by_versions_that_know_less_or_more() {
+    let known = RunDetails { keep_off_m: 200.0, ..RunDetails::default() };
+    assert_eq!(RunDetails::from_json(Some(&known.to_json())), known);
+    let later = r#"{"keep_off_m": 200.0, "of_a_later_version": [1]}"#;
+    assert_eq!(RunDetails::from_json(Some(later)), known);
+    for none in [None, Some(""), Some("[]")] {
+        assert_eq!(RunDetails::from_json(none), RunDetails::default());
     }
 }

@@ -394,6 +394,7 @@ impl Trainer {
         if let Some(storage) = &mut self.storage {
             storage.rounds(step.records);
             storage.exercise(step.events);
+            storage.tracks(step.tracks);
         }
         step.faults.iter().for_each(|change| self.faults.tell(change));
         step.notes.iter().for_each(tell);
@@ -517,6 +518,7 @@ impl Trainer {
         if let Some(mut storage) = self.storage.take() {
             storage.rounds(&left);
             storage.exercise(&exercise);
+            storage.tracks(self.session.tracks());
             let (lost, failed) = storage.finish();
             lost_entries = lost;
             wrong.extend(failed.iter().map(|e| format!("{e:#}")));

@@ -13,7 +13,7 @@ use std::{
 
 use anyhow::{Context, Result, bail};
 use bowwave_core::{pacing::FRAMES_PER_S, session::Setup, time::Time, world::scenario::Scenario};
-use bowwave_record::{JournalOptions, Properties, Run};
+use bowwave_record::{JournalOptions, Properties, Run, RunDetails};
 use bowwave_trainer::{
     Finished, Signals, TickClock, Trainer, TrainerOptions,
     presenter::{GpuSettings, OutputOptions, PresenterOptions, Seat},
@@ -222,6 +222,7 @@ fn storage(arguments: &DeskArgs, prepared: &PreparedRun, realtime: bool, origin:
             version: env!("CARGO_PKG_VERSION").to_owned(),
             boot_id: bowwave_record::boot_id(),
             started: Some(origin),
+            details: Some(RunDetails::of(&prepared.setup).to_json()),
         },
         journal: JournalOptions::default(),
         recording: prepared.record.then(|| RecorderOptions {

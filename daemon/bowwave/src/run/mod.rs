@@ -20,7 +20,7 @@ use bowwave_core::{
     world::scenario::{self, Scenario},
 };
 use bowwave_devices::clock::now;
-use bowwave_record::{JournalOptions, Run as JournalRun};
+use bowwave_record::{JournalOptions, Run as JournalRun, RunDetails};
 use bowwave_trainer::{
     Ended, Signals, TickClock, Trainer, TrainerOptions,
     presenter::{GpuSettings, OutputOptions, PresenterOptions},
@@ -158,6 +158,7 @@ impl Gun<'_> {
                 version: env!("CARGO_PKG_VERSION").to_owned(),
                 boot_id,
                 started: Some(now()),
+                details: Some(RunDetails::of(&settings.setup).to_json()),
             },
             journal: JournalOptions {
                 reserve_bytes: JournalOptions::RESERVE_BYTES,

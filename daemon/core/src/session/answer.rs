@@ -6,7 +6,7 @@ use crate::{
     fault::FaultChange,
     frame::scene::Scene,
     time::Time,
-    world::{exercise::ExerciseEvent, score::ShotRecord},
+    world::{exercise::ExerciseEvent, score::ShotRecord, track::TrackBlock},
 };
 
 /// The answer to one tick.
@@ -18,6 +18,8 @@ pub struct TickAnswer<'a> {
     pub records: &'a [ShotRecord],
     /// Events of the exercise, for the score.
     pub events: &'a [ExerciseEvent],
+    /// Tracks of boats, rounds and gun since the last tick, for the debrief.
+    pub tracks: &'a TrackBlock,
     /// Faults that the session itself has found to come or go. It knows of them already: they are for the log only.
     pub faults: &'a [FaultChange],
     /// Notes for the log.

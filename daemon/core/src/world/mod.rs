@@ -17,6 +17,7 @@ mod sea_change;
 pub mod searchlight;
 pub mod seeing;
 mod stage;
+pub mod track;
 pub mod waves;
 pub mod weapon;
 

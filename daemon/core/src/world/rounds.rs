@@ -10,11 +10,12 @@ use crate::{
         boats::RoundStrike,
         burst::FragmentStrike,
         fleet::Fleet,
-        gunnery::{Atmosphere, Flight, Projectile, dispersed},
+        gunnery::{Atmosphere, Flight, FlightState, Projectile, dispersed},
         scenario::WeaponSpec,
         score::{
             Approach, BoreSample, End, MissExplanation, MissedRound, Moving, Outcome, Round, ShotRecord,
         },
+        track::RoundPath,
         waves::WaveField,
     },
 };
@@ -98,6 +99,7 @@ struct InFlight {
     /// The barrel before, oldest first.
     before: Vec<BoreSample>,
     round: Round,
+    path: RoundPath,
     tracer: bool,
     bounces: u32,
 }
@@ -116,6 +118,18 @@ pub struct ExplainedMiss {
 }
 
 impl InFlight {
+    /// Seconds from when it was fired to `time_s` on the rounds' clock.
+    fn after_s(&self, time_s: f64, start: Time) -> f64 {
+        time_s - self.launch.fired.secs_since(start)
+    }
+
+    /// Its path up to where it ends at `at`.
+    fn ended_path(&mut self, time_s: f64, at: DVec3, start: Time) -> RoundPath {
+        let after_s = self.after_s(time_s, start);
+        self.path.push(after_s, FlightState { position: at, ..self.round.state_at(time_s) });
+        std::mem::replace(&mut self.path, RoundPath { shot: 0, fired_ns: 0, points: Vec::new() })
+    }
+
     /// The round as it goes on where it meets the water so flatly that it bounces.
     ///
     /// It keeps .9 to .5 of its speed, less the steeper it came, and leaves at its angle to half as much more (Haag, Shooting Incident
@@ -234,14 +248,23 @@ pub struct Rounds {
     marks: Vec<(Time, ImpactMark)>,
     explained: Vec<ExplainedMiss>,
     fragments: Vec<FragmentHit>,
+    paths: Vec<RoundPath>,
     advanced_to: Time,
 }
 
 impl Rounds {
     /// No round has been fired at `start`.
     pub fn new(ammunition: Ammunition, sea: WaveField, start: Time) -> Self {
-        let (in_flight, marks, explained, fragments) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { ammunition, sea, in_flight, marks, explained, fragments, advanced_to: start }
+        Self {
+            ammunition,
+            sea,
+            in_flight: Vec::new(),
+            marks: Vec::new(),
+            explained: Vec::new(),
+            fragments: Vec::new(),
+            paths: Vec::new(),
+            advanced_to: start,
+        }
     }
 
     /// The sea is another from now on.
@@ -263,8 +286,9 @@ impl Rounds {
         match Flight::new(a.weapon.projectile, &Atmosphere::ICAO, launch.muzzle, flown, a.wind) {
             Some(flight) => {
                 let tracer = a.weapon.is_tracer(launch.shot);
+                let path = RoundPath::begin(launch.shot, launch.fired, flight.state());
                 let round = Round::new(launch.shot, launch.fired.secs_since(start), flight);
-                self.in_flight.push(InFlight { launch, flown, before, round, tracer, bounces: 0 });
+                self.in_flight.push(InFlight { launch, flown, before, round, path, tracer, bounces: 0 });
             }
             None => records.push(launch.record(Outcome::Miss {
                 boat: None,
@@ -311,14 +335,17 @@ impl Rounds {
                 })
                 .collect();
             let mut ended = Vec::new();
-            let Self { in_flight, sea, explained, ammunition, marks, .. } = self;
+            let Self { in_flight, sea, explained, ammunition, marks, paths, .. } = self;
             in_flight.retain_mut(|f| match f.round.advance(to_s, &boats, sea) {
                 Some(End::Splashed { at, time_s })
                     if let Some(next) = f.ricochet(ammunition, sea, at, time_s) =>
                 {
                     let height_m = GRAZED * f.splash_m(ammunition, time_s);
                     marks.push((start.plus_secs(time_s), ImpactMark::Splash { at, height_m }));
+                    let after_s = f.after_s(time_s, start);
+                    f.path.push(after_s, FlightState { position: at, ..f.round.state_at(time_s) });
                     f.round = next;
+                    f.path.push(after_s, f.round.state_at(time_s));
                     f.bounces += 1;
                     true
                 }
@@ -331,6 +358,11 @@ impl Rounds {
                     if let (Some(nearest), false) = (nearest, struck || beside) {
                         explained.extend(f.explain(ammunition, nearest, start, fleet));
                     }
+                    let (time_s, at) = match end {
+                        End::Splashed { time_s, at } | End::Struck { time_s, at, .. } => (time_s, at),
+                        End::Spent { time_s } => (time_s, f.round.state_at(time_s).position),
+                    };
+                    paths.push(f.ended_path(time_s, at, start));
                     let splash_m = match end {
                         End::Splashed { time_s, .. } | End::Struck { time_s, .. } => {
                             f.splash_m(ammunition, time_s)
@@ -340,7 +372,11 @@ impl Rounds {
                     ended.push(EndedRound { launch: f.launch, nearest, end, splash_m, fragments, beside });
                     false
                 }
-                None => true,
+                None => {
+                    let (after_s, state) = (f.after_s(to_s, start), f.round.state_at(to_s));
+                    f.path.follow(after_s, state);
+                    true
+                }
             });
             ended
         };
@@ -396,6 +432,11 @@ impl Rounds {
     /// Boats that fragments have struck since this was last asked, beside those that records name.
     pub fn take_fragments(&mut self) -> std::vec::Drain<'_, FragmentHit> {
         self.fragments.drain(..)
+    }
+
+    /// Paths of rounds that have ended since this was last asked.
+    pub fn take_paths(&mut self) -> std::vec::Drain<'_, RoundPath> {
+        self.paths.drain(..)
     }
 
     /// Misses that were explained since this was last asked.

@@ -14,6 +14,7 @@ use super::{
     sea_change::{SeaChange, conditions_of},
     searchlight::{Beam, LightSwitch, Searchlight, SearchlightSpec},
     seeing::{SceneLight, threshold},
+    track::{TrackBlock, TrackSampler},
     waves::WaveField,
     weapon::{Stoppages, Weapon, WeaponState},
 };
@@ -84,6 +85,9 @@ pub struct World {
     watch: ExerciseWatch,
     /// What happened in the exercise within the last call.
     events: Vec<ExerciseEvent>,
+    /// Tracks of boats and rounds that the last call added.
+    tracks: TrackBlock,
+    sampler: Option<TrackSampler>,
     /// The scenario's newest text for the trainee, with its time.
     message: Option<(Time, Arc<str>)>,
     score: Score,
@@ -204,6 +208,8 @@ impl World {
             running: None,
             watch: ExerciseWatch::new(scenario.exercise.clone()),
             events: Vec::new(),
+            tracks: TrackBlock::default(),
+            sampler: None,
             message: None,
             score: Score::default(),
             last_result: None,
@@ -274,6 +280,7 @@ impl World {
         records: &mut Vec<ShotRecord>,
     ) {
         self.events.clear();
+        self.tracks.clear();
         let mut running = self.running.take().unwrap_or_else(|| self.begin(begin));
         let now = running.now.max(until);
         for (time, order) in self.driving.drain(..) {
@@ -307,6 +314,9 @@ impl World {
         }
         running.rounds.advance(now, running.start, &mut running.fleet, records);
         running.now = now;
+        let sampler = self.sampler.get_or_insert(TrackSampler::new(running.start));
+        sampler.sample(now, &running.fleet, &mut self.tracks.samples);
+        self.tracks.rounds.extend(running.rounds.take_paths());
         if self.weapon.state() == WeaponState::Stoppage && !was_stopped {
             self.events.push(ExerciseEvent { time: now, fact: ExerciseFact::Stoppage });
         }
@@ -367,6 +377,11 @@ impl World {
         &self.events
     }
 
+    /// Tracks that the last call which went on or ended added. The camera's is the caller's to fill in.
+    pub const fn tracks(&self) -> &TrackBlock {
+        &self.tracks
+    }
+
     /// The exercise around boats and rounds.
     pub const fn watch(&self) -> &ExerciseWatch {
         &self.watch
@@ -395,12 +410,18 @@ impl World {
     /// Rounds still in the air are recorded as misses: the session ends here.
     pub fn finish(&mut self, records: &mut Vec<ShotRecord>) {
         self.events.clear();
+        self.tracks.clear();
         if let Some(running) = &mut self.running {
             let boats = running.watched(None, None);
             let mut ended = Vec::new();
             self.watch.finish(running.now, &boats, self.weapon.rounds_in_all(), &mut ended);
             let RunningWorld { start, now, fleet, rounds, .. } = running;
+            // Boats that are followed further forget where they were.
+            if let Some(sampler) = &mut self.sampler {
+                sampler.finish(*now, fleet, &mut self.tracks.samples);
+            }
             rounds.advance(now.plus_secs(ROUND_OVER_S), *start, fleet, records);
+            self.tracks.rounds.extend(rounds.take_paths());
             running.note_ends(&mut self.events);
             self.events.append(&mut ended);
         }

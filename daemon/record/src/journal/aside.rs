@@ -199,6 +199,7 @@ fn header(id: i64, run: &Run) -> Value {
         "version": run.version,
         "boot_id": run.boot_id,
         "started_ns": run.started.map(Time::ns),
+        "details": run.details,
     })
 }
 
@@ -214,6 +215,7 @@ fn of_header(line: &str) -> Option<(i64, Run)> {
         version: text("version"),
         boot_id: value["boot_id"].as_str().map(str::to_owned),
         started: value["started_ns"].as_i64().map(Time::from_ns),
+        details: value["details"].as_str().map(str::to_owned),
     };
     Some((value["rounds_of_run"].as_i64()?, run))
 }

@@ -15,6 +15,8 @@
 
 mod aside;
 mod boot;
+mod debrief;
+mod details;
 mod error;
 mod event;
 mod open;
@@ -24,6 +26,7 @@ mod query;
 mod reserve;
 mod row;
 mod schema;
+mod track;
 mod worker;
 
 use std::{
@@ -37,19 +40,21 @@ use std::{
 use bowwave_core::{
     fault::Fault,
     time::Time,
-    world::{exercise::ExerciseEvent, score::ShotRecord},
+    world::{exercise::ExerciseEvent, score::ShotRecord, track::TrackBlock},
 };
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded, unbounded};
 
 pub use aside::{put_aside, side_files};
 use boot::WallClock;
 pub use boot::{DirtyEnd, DirtyRun, boot_id};
+pub use details::{BoatDetails, CameraDetails, RunDetails};
 pub use error::{JournalError, Unwritten};
 use event::NumberedEvent;
 pub use event::{StoredEvent, read_events};
 use place::FolderHold;
 pub use query::{RunSelection, ShotFilter, StoredRun, read_runs, read_shots};
 pub use row::StoredShot;
+pub use track::{StoredTracks, read_tracks};
 use worker::{JournalChannels, JournalEnd, JournalWorker, Pending};
 
 /// Rounds that may wait for the writing thread before [`Journal::shot`] refuses: minutes of firing.
@@ -73,6 +78,8 @@ pub struct Run {
     pub boot_id: Option<String>,
     /// Time of its beginning since that boot.
     pub started: Option<Time>,
+    /// Details for the debrief, as JSON; `None` where there are none, as in journals before tables of version 5.
+    pub details: Option<String>,
 }
 
 /// How a journal is kept.
@@ -183,6 +190,7 @@ struct JournalStatus {
 enum JournalMessage {
     Shot(ShotRecord),
     Event(NumberedEvent),
+    Tracks(u64, TrackBlock),
     Clock(WallClock),
 }
 
@@ -304,6 +312,12 @@ impl Journal {
         self.send(JournalMessage::Event(NumberedEvent { number, event: event.clone() }), 0)
     }
 
+    /// Queues a block of tracks, by its number in the run; never waits. Errors as of [`Self::shot`]. Tracks give way to rounds: where the disk
+    /// has no room for them they are left out, and the log says so.
+    pub fn tracks(&self, number: u64, block: TrackBlock) -> Result<(), JournalError> {
+        self.send(JournalMessage::Tracks(number, block), 0)
+    }
+
     /// Tells what the wall clock shows, nanoseconds since 1970, at a time since boot, once it is known to be set. All runs of
     /// this boot without a wall time get theirs. Never waits; where the queue is full, say it again later.
     pub fn set_wall_clock(&self, wall_ns: i64, at: Time) -> Result<(), JournalError> {
@@ -396,6 +410,10 @@ impl Journal {
             JournalMessage::Shot(shot) => Some(shot),
             JournalMessage::Event(event) => {
                 log::error!("event not in the journal: {}", event.fact());
+                None
+            }
+            JournalMessage::Tracks(number, _) => {
+                log::error!("block {number} of the boats' tracks is not in the journal");
                 None
             }
             JournalMessage::Clock(_) => None,

@@ -5,7 +5,7 @@ use std::path::Path;
 use bowwave_core::time::Time;
 use rusqlite::{Connection, params};
 
-use super::{JournalError, Run, StoredShot, open, row};
+use super::{JournalError, Run, StoredShot, open, row, track};
 
 /// Which runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -89,11 +89,12 @@ pub(super) fn selected(
 pub fn read_runs(path: &Path) -> Result<Vec<StoredRun>, JournalError> {
     let (connection, version) = open::for_reading(path)?;
     let boot = if version >= 2 { "boot_id, started_ns" } else { "NULL, NULL" };
+    let details = if version >= track::VERSION { "details" } else { "NULL" };
     let read = || -> rusqlite::Result<Vec<StoredRun>> {
         let mut statement = connection.prepare(&format!(
             "SELECT id, started_wall_ns, scenario, recording, seed, version, finished, \
              (SELECT count(*) FROM shots WHERE run = id), \
-             (SELECT count(*) FROM shots WHERE run = id AND outcome = 'hit'), {boot} FROM runs ORDER BY id",
+             (SELECT count(*) FROM shots WHERE run = id AND outcome = 'hit'), {boot}, {details} FROM runs ORDER BY id",
         ))?;
         let rows = statement.query_map([], |row| {
             let seed: String = row.get(4)?;
@@ -113,6 +114,7 @@ pub fn read_runs(path: &Path) -> Result<Vec<StoredRun>, JournalError> {
                     version: row.get(5)?,
                     boot_id: row.get(9)?,
                     started: row.get::<_, Option<i64>>(10)?.map(Time::from_ns),
+                    details: row.get(11)?,
                 },
                 finished: row.get(6)?,
                 shots: row.get::<_, i64>(7)?.unsigned_abs(),

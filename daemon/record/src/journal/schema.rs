@@ -7,13 +7,13 @@ use rusqlite::{Connection, OptionalExtension as _, TransactionBehavior, params};
 
 use bowwave_core::text::one_line;
 
-use super::{JournalError, Run, event, row};
+use super::{JournalError, Run, event, row, track};
 
 /// Marks the file as ours ("BOWW").
 pub(super) const APPLICATION_ID: i64 = 0x424f_5757;
 /// Version of the tables. 2: runs know the boot and the time since it at which they began. 3: hits know whose boat was struck. 4:
-/// events of the exercise.
-pub(super) const VERSION: i64 = event::VERSION;
+/// events of the exercise. 5: tracks, and details of runs.
+pub(super) const VERSION: i64 = track::VERSION;
 
 /// The tables of version 1. Numbers that are not finite become NULL, since SQLite has no NaN.
 const TABLES: &str = "
@@ -74,6 +74,9 @@ pub(super) fn foreign_part(connection: &Connection) -> rusqlite::Result<Option<S
     ];
     if version >= event::VERSION {
         wanted.push(("events", "run, number, time_ns, fact"));
+    }
+    if version >= track::VERSION {
+        wanted.push(("tracks", "run, number, block"));
     }
     for (table, names) in wanted {
         let found = columns(table)?;
@@ -154,7 +157,10 @@ pub(super) fn make_tables(connection: &mut Connection) -> rusqlite::Result<()> {
     if found < 3 {
         transaction.execute_batch(SIDE_COLUMN)?;
     }
-    transaction.execute_batch(event::TABLE)?;
+    if found < event::VERSION {
+        transaction.execute_batch(event::TABLE)?;
+    }
+    transaction.execute_batch(track::TABLE)?;
     transaction.execute_batch(&format!(
         "PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION};"
     ))?;
@@ -164,8 +170,8 @@ pub(super) fn make_tables(connection: &mut Connection) -> rusqlite::Result<()> {
 /// Begins a run, with a number of its own unless `id` says which, and gives its number.
 pub(super) fn begin_run(connection: &Connection, id: Option<i64>, run: &Run) -> rusqlite::Result<i64> {
     connection.execute(
-        "INSERT INTO runs (id, started_wall_ns, scenario, recording, seed, version, boot_id, started_ns) \
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+        "INSERT INTO runs (id, started_wall_ns, scenario, recording, seed, version, boot_id, started_ns, details) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
         params![
             id,
             run.started_wall_ns,
@@ -175,6 +181,7 @@ pub(super) fn begin_run(connection: &Connection, id: Option<i64>, run: &Run) -> 
             run.version,
             run.boot_id,
             run.started.map(|time| time.ns()),
+            run.details,
         ],
     )?;
     Ok(connection.last_insert_rowid())

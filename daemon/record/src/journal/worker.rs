@@ -17,12 +17,13 @@ use super::{
     JournalError, JournalFault, JournalMessage, JournalSettings, JournalStatus, Quarantine, Run, StoredShot,
     Unwritten, aside,
     boot::WallClock,
-    event::{self, NumberedEvent},
+    debrief::DebriefRows,
     open::{connect, empty_log_at_end, keep_log},
     place::FilePlace,
     quarantine,
     reserve::Reserve,
     row, schema,
+    track::NumberedBlock,
 };
 
 /// Most rounds in one transaction.
@@ -92,9 +93,8 @@ pub(super) struct JournalWorker {
     side_file: Option<PathBuf>,
     /// Committed rounds of this run, oldest first, for a fresh database.
     kept: VecDeque<ShotRecord>,
-    /// Events of the exercise that are to be written, and those of this run that were, for a fresh database.
-    events: VecDeque<NumberedEvent>,
-    events_kept: VecDeque<NumberedEvent>,
+    /// Events of the exercise and tracks.
+    debrief: DebriefRows,
     /// Committed rounds that are too many to be kept.
     not_kept: u64,
     /// Wall time to be filled in.
@@ -141,8 +141,7 @@ impl JournalWorker {
             in_doubt: false,
             side_file: None,
             kept: VecDeque::new(),
-            events: VecDeque::new(),
-            events_kept: VecDeque::new(),
+            debrief: DebriefRows::new(settings.held_max, settings.kept_max),
             not_kept: 0,
             clock: None,
             damage: None,
@@ -191,7 +190,7 @@ impl JournalWorker {
     /// Nothing is to be written.
     fn is_idle(&self) -> bool {
         self.held().held.is_empty()
-            && self.events.is_empty()
+            && self.debrief.is_empty()
             && self.clock.is_none()
             && self.failures == 0
             && !self.in_doubt
@@ -213,10 +212,10 @@ impl JournalWorker {
     fn take(&mut self, message: JournalMessage) {
         match message {
             JournalMessage::Shot(shot) => self.held().held.push_back(shot),
-            JournalMessage::Event(event) if self.events.len() < self.settings.held_max => {
-                self.events.push_back(event);
+            JournalMessage::Event(event) => self.debrief.take_event(event),
+            JournalMessage::Tracks(number, block) => {
+                self.debrief.take_block(NumberedBlock::new(number, &block), self.low);
             }
-            JournalMessage::Event(event) => log::error!("event not in the journal: {}", event.fact()),
             JournalMessage::Clock(clock) => {
                 // A fresh database would begin this run with it.
                 self.run.started_wall_ns = self
@@ -294,8 +293,8 @@ impl JournalWorker {
         if !self.held().held.is_empty() {
             self.commit(connection)?;
         }
-        if !self.events.is_empty() {
-            self.commit_events(connection)?;
+        if !self.debrief.is_empty() {
+            self.debrief.commit(connection, self.id).map_err(fail)?;
         }
         if let Some(clock) = self.clock {
             if let Some(boot_id) = &self.run.boot_id {
@@ -334,9 +333,7 @@ impl JournalWorker {
                 log::error!("shot {} is not in the journal {}: {why}", shot.shot, self.path.display());
             }
         }
-        for event in &self.events_kept {
-            event::insert_once(&transaction, id, event)?;
-        }
+        self.debrief.insert_kept(&transaction, id)?;
         transaction.commit()?;
         self.id = id;
         Ok(())
@@ -345,7 +342,7 @@ impl JournalWorker {
     /// Puts the damaged database aside and begins another with what is known of this run.
     fn start_afresh(&mut self, reason: &str) -> Result<(), JournalError> {
         self.connection = None;
-        let Self { path, settings, id, run, kept, events_kept, .. } = self;
+        let Self { path, settings, id, run, kept, debrief, .. } = self;
         let kept_as = quarantine::replace(path, settings, |connection| {
             let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
             schema::begin_run(&transaction, Some(*id), run)?;
@@ -353,9 +350,7 @@ impl JournalWorker {
                 // Taken before, so never refused.
                 row::insert_once(&transaction, *id, shot)?.unwrap_or_default();
             }
-            for event in events_kept.iter() {
-                event::insert_once(&transaction, *id, event)?;
-            }
+            debrief.insert_kept(&transaction, *id)?;
             transaction.commit()
         })?;
         self.damage = None;
@@ -403,23 +398,6 @@ impl JournalWorker {
         Ok(())
     }
 
-    /// Commits events, as many as one transaction takes.
-    fn commit_events(&mut self, connection: &mut Connection) -> Result<(), JournalError> {
-        let count = self.events.len().min(BATCH);
-        let insert = |connection: &mut Connection| -> rusqlite::Result<()> {
-            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-            for event in self.events.iter().take(count) {
-                event::insert_once(&transaction, self.id, event)?;
-            }
-            transaction.commit()
-        };
-        insert(connection).map_err(|error| JournalError::from_sql(&self.path, &error))?;
-        self.events_kept.extend(self.events.drain(..count));
-        let beyond = self.events_kept.len().saturating_sub(self.settings.kept_max);
-        self.events_kept.drain(..beyond);
-        Ok(())
-    }
-
     fn failed(&mut self, error: &JournalError) {
         self.failures = self.failures.saturating_add(1);
         let waiting = self.held().held.len();
@@ -428,7 +406,7 @@ impl JournalWorker {
     }
 
     fn recovered(&mut self) {
-        let over = self.failures > 0 && self.held().held.is_empty() && self.events.is_empty();
+        let over = self.failures > 0 && self.held().held.is_empty() && self.debrief.is_empty();
         if over {
             self.failures = 0;
         }
@@ -522,9 +500,7 @@ impl JournalWorker {
     /// Closes the run, or saves what could not be written.
     fn end(mut self, cause: Option<String>) -> JournalEnd {
         self.take_all();
-        for event in &self.events {
-            log::error!("event not in the journal: {}", event.fact());
-        }
+        self.debrief.tell_unwritten();
         let (rows, in_doubt) = self.unwritten();
         if rows.is_empty() {
             if let Some(file) = &self.side_file

@@ -3,6 +3,7 @@
 
 mod commits;
 mod recorder;
+mod tracks;
 
 use std::{
     collections::VecDeque,
@@ -18,7 +19,7 @@ use bowwave_core::{
     fault::{Fault, FaultChange},
     session::SessionDigest,
     time::{NS_PER_S, Time},
-    world::{exercise::ExerciseEvent, score::ShotRecord},
+    world::{exercise::ExerciseEvent, score::ShotRecord, track::TrackBlock},
 };
 use bowwave_devices::clock::now;
 use bowwave_record::{
@@ -27,6 +28,7 @@ use bowwave_record::{
 };
 
 pub use recorder::{Recorder, RecorderOptions};
+use tracks::TrackQueue;
 
 use crate::supervisor::{FaultLog, WallTime};
 
@@ -136,6 +138,7 @@ pub struct Storage {
     /// Events that wait, with the number of the first.
     events: VecDeque<ExerciseEvent>,
     events_sent: u64,
+    tracks: TrackQueue,
     recorder: Option<Recorder>,
     /// A recording that takes nothing more, until what waits is written.
     closed: Option<Recorder>,
@@ -179,6 +182,7 @@ impl Storage {
             waiting: VecDeque::new(),
             events: VecDeque::new(),
             events_sent: 0,
+            tracks: TrackQueue::default(),
             recorder,
             closed: None,
             recording_failed,
@@ -236,6 +240,11 @@ impl Storage {
         }
     }
 
+    /// Takes in tracks of boats, rounds and gun.
+    pub fn tracks(&mut self, tracks: &TrackBlock) {
+        self.tracks.take(tracks);
+    }
+
     /// Keeps rounds for the journal; the rest that finds no place.
     fn keep<'a>(&mut self, records: &'a [ShotRecord]) -> &'a [ShotRecord] {
         let room = ROUNDS_WAITING_MAX.saturating_sub(self.waiting.len());
@@ -262,6 +271,7 @@ impl Storage {
                 }
             }
             send_events(journal, &mut self.events, &mut self.events_sent);
+            self.tracks.send(journal);
             if let Some(wall) = self.wall
                 && journal.set_wall_clock(wall.wall_ns, wall.at).is_ok()
             {
@@ -397,6 +407,7 @@ impl Storage {
         let written = match journal {
             Some(journal) => {
                 send_events(&journal, &mut self.events, &mut self.events_sent);
+                self.tracks.finish(&journal);
                 write_out(journal, &mut self.waiting, &self.options)
             }
             None if self.waiting.is_empty() => Ok(()),
@@ -410,6 +421,7 @@ impl Storage {
         for event in &self.events {
             log::error!("event not in the journal: {event:?}");
         }
+        self.tracks.tell_unwritten();
         if self.options.strict && self.options.recording.is_some() && self.recorder.is_none() {
             let why = "the recording ended before the run: the disk is full or cannot be written; free it and run again";
             wrong.push(anyhow::anyhow!(why));

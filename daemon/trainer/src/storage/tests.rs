@@ -1,9 +1,12 @@
 use std::path::Path;
 
 use super::*;
-use bowwave_core::world::score::{NotScored, Outcome};
+use bowwave_core::world::{
+    score::{NotScored, Outcome},
+    track::TrackSample,
+};
 
-use bowwave_record::{RunSelection, ShotFilter, read_shots};
+use bowwave_record::{RunSelection, ShotFilter, read_shots, read_tracks};
 use glam::DVec3;
 
 fn round(shot: u64) -> ShotRecord {
@@ -26,6 +29,7 @@ fn options(folder: &Path) -> StorageOptions {
         version: "0".to_owned(),
         boot_id: None,
         started: Some(now()),
+        details: None,
     };
     StorageOptions {
         folder: folder.to_owned(),
@@ -119,4 +123,31 @@ fn strict_storage_refuses_what_cannot_be_opened() {
     let base = tempfile::tempdir().unwrap();
     let strict = StorageOptions { strict: true, ..options(&base.path().join("absent")) };
     assert!(Storage::open(strict, &mut Vec::new()).is_err());
+}
+
+/// Tracks that came before the journal was open are in it, in their order, and so is the last block, which is not full.
+#[test]
+fn tracks_wait_for_the_journal_too() {
+    let base = tempfile::tempdir().unwrap();
+    let folder = base.path().join("data");
+    let mut storage = Storage::open(options(&folder), &mut Vec::new()).unwrap();
+    let sample = |i: i64| TrackSample { time_ns: i, camera: None, boats: Vec::new() };
+    let mut all = TrackBlock::default();
+    for i in 0..25 {
+        let one = TrackBlock { samples: vec![sample(i)], rounds: Vec::new() };
+        storage.tracks(&one);
+        all.append(&one);
+    }
+    let (mut faults, mut events) = (FaultLog::new(None), Vec::new());
+    storage.poll(&mut faults, &mut events).unwrap();
+    std::fs::create_dir_all(&folder).unwrap();
+    let until = now().plus_secs(20.0);
+    while storage.broken().is_some() && now() < until {
+        storage.poll(&mut faults, &mut events).unwrap();
+        thread::sleep(Duration::from_millis(20));
+    }
+    let (_, wrong) = storage.finish();
+    assert!(wrong.is_empty(), "{wrong:?}");
+    let stored = read_tracks(&folder.join(JOURNAL), RunSelection::Latest).unwrap();
+    assert_eq!((stored.tracks, stored.missing), (all, 0));
 }
