@@ -15,6 +15,7 @@ use serde_json::Value;
 const RANKS: &[(&str, u8)] = &[
     ("bowwave-core", 0),
     ("bowwave-files", 0),
+    ("bowwave-web", 0),
     ("shaders-spirv", 0),
     // A tool of tests that knows nothing of the product.
     ("gpu-fault-layer", 0),
@@ -23,6 +24,7 @@ const RANKS: &[(&str, u8)] = &[
     ("bowwave-render", 1),
     ("bowwave-models", 1),
     ("bowwave-calibration", 2),
+    ("bowwave-review", 2),
     ("hw-sim", 3),
     ("bowwave-import", 3),
     ("bowwave-trainer", 4),

@@ -66,6 +66,8 @@ pub enum ProgramCommand {
     Hits(Hits),
     /// Print the score of a run: threats, rounds, calls, rules, and why each round missed
     Score(ScoreArgs),
+    /// Make a page on which a run is debriefed: chart, a view that is moved, events, score and rounds in step with one time line
+    Review(ReviewArgs),
     /// Measure lens, mounting and timing, or print the board for it
     Calibrate(Calibrate),
     /// Print what a shell needs to complete this command line
@@ -304,6 +306,23 @@ pub struct ScoreArgs {
     /// Print as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `review`.
+#[derive(Debug, Args)]
+pub struct ReviewArgs {
+    /// Journal (SQLite) or the folder that a run left
+    #[arg(default_value = "bowwave-out")]
+    pub run: PathBuf,
+    /// This run of the journal; without it the newest
+    #[arg(long = "run", value_name = "N")]
+    pub number: Option<i64>,
+    /// The page to write (HTML); without it review-N.html beside the journal
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Open the page in the desktop's browser
+    #[arg(long)]
+    pub open: bool,
 }
 
 /// `imu-freeze@2.5+0.5`.

@@ -21,6 +21,7 @@ mod plan;
 mod play;
 pub mod program;
 mod replay;
+mod review;
 mod run;
 mod scenario;
 mod score;
@@ -68,6 +69,7 @@ fn dispatch(
         }
         ProgramCommand::Hits(arguments) => hits::run(arguments).map(|()| Outcome::Done),
         ProgramCommand::Score(arguments) => score::run(arguments).map(|()| Outcome::Done),
+        ProgramCommand::Review(arguments) => review::run(arguments),
         ProgramCommand::Calibrate(arguments) => calibrate::run(arguments.task.as_ref()),
         ProgramCommand::Completions(arguments) => completions::run(arguments.shell),
         ProgramCommand::Licences => licences::run(),

@@ -1,84 +1,27 @@
 //! `bowwave score`: what a run is worth, and why.
 
 use anyhow::Result;
-use bowwave_core::{
-    text::one_line,
-    world::{
-        exercise::{ExerciseEvent, ExerciseFact},
-        score::{ScoreFold, ScoreSheet},
-    },
-};
-use bowwave_record::journal::{RunSelection, ShotFilter, read_events, read_shots};
-use serde::Serialize;
+use bowwave_core::{text::one_line, world::score::ScoreSheet};
+use bowwave_record::journal::RunSelection;
+use bowwave_review::ScoredRun;
 
 use crate::{cli::ScoreArgs, hits::journal_at, stdout};
-
-/// A score with the misses that it explains.
-#[derive(Debug, Serialize)]
-struct Scored {
-    #[serde(flatten)]
-    sheet: ScoreSheet,
-    explained: Vec<ExplainedRound>,
-}
-
-/// A round that missed, and why.
-#[derive(Debug, Serialize)]
-struct ExplainedRound {
-    shot: u64,
-    boat: String,
-    error_m: [f64; 2],
-    error_mrad: [f64; 2],
-    largest_cause: &'static str,
-    /// It passed the boat by no more than 50 m.
-    was_aimed: bool,
-    in_words: String,
-}
 
 /// Prints the score of a run.
 pub fn run(arguments: &ScoreArgs) -> Result<()> {
     let path = journal_at(&arguments.run)?;
     let runs = arguments.number.map_or(RunSelection::Latest, RunSelection::Run);
-    let mut fold = ScoreFold::default();
-    let (mut explained, mut unknown) = (Vec::new(), 0);
-    for event in read_events(&path, runs)? {
-        match event {
-            Ok(event) => {
-                explained.extend(explained_round(&event));
-                fold.event(&event);
-            }
-            Err(_) => unknown += 1,
-        }
+    let scored = ScoredRun::read(&path, runs)?;
+    if scored.unknown > 0 {
+        log::warn!(
+            "{} events of the run are of a newer version and do not count; score it with that",
+            scored.unknown
+        );
     }
-    for stored in read_shots(&path, &ShotFilter { runs, hits_only: false })? {
-        fold.shot(&stored.record);
-    }
-    if unknown > 0 {
-        log::warn!("{unknown} events of the run are of a newer version and do not count; score it with that");
-    }
-    explained.sort_by_key(|round: &ExplainedRound| round.shot);
-    let scored = Scored { sheet: fold.sheet(), explained };
     if arguments.json {
         return stdout::print_json(&scored);
     }
     stdout::print(format!("{}{}", text(&scored.sheet), misses(&scored)))
-}
-
-fn explained_round(event: &ExerciseEvent) -> Option<ExplainedRound> {
-    let ExerciseFact::Missed { shot, boat, why } = &event.fact else { return None };
-    Some(ExplainedRound {
-        shot: *shot,
-        boat: boat.clone(),
-        error_m: why.error_m(),
-        error_mrad: why.error_mrad,
-        largest_cause: why.largest().name(),
-        was_aimed: why.was_aimed(),
-        in_words: if why.was_aimed() {
-            why.to_string()
-        } else {
-            let [right, over] = why.error_m();
-            format!("{:.0} m off at {:.0} m; fired at no boat", right.hypot(over), why.range_m)
-        },
-    })
 }
 
 /// A score sheet for people.
@@ -229,7 +172,7 @@ fn boats(sheet: &ScoreSheet) -> String {
     text
 }
 
-fn misses(scored: &Scored) -> String {
+fn misses(scored: &ScoredRun) -> String {
     if scored.explained.is_empty() {
         return String::new();
     }

@@ -392,9 +392,7 @@ impl Trainer {
         let stepped = now();
         self.tally.records(step.records);
         if let Some(storage) = &mut self.storage {
-            storage.rounds(step.records);
-            storage.exercise(step.events);
-            storage.tracks(step.tracks);
+            storage.take(step.records, step.events, step.tracks);
         }
         step.faults.iter().for_each(|change| self.faults.tell(change));
         step.notes.iter().for_each(tell);
@@ -516,9 +514,7 @@ impl Trainer {
         self.tally.records(&left);
         let mut lost_entries = 0;
         if let Some(mut storage) = self.storage.take() {
-            storage.rounds(&left);
-            storage.exercise(&exercise);
-            storage.tracks(self.session.tracks());
+            storage.take(&left, &exercise, self.session.tracks());
             let (lost, failed) = storage.finish();
             lost_entries = lost;
             wrong.extend(failed.iter().map(|e| format!("{e:#}")));

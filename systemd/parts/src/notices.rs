@@ -18,7 +18,7 @@ const MIT: &str = include_str!("../foreign/mit.txt");
 const APACHE: &str = include_str!("../../../LICENSE-APACHE");
 
 /// Third-party parts of the program beside crates.
-const FOREIGN: [ForeignPart; 5] = [
+const FOREIGN: [ForeignPart; 8] = [
     ForeignPart {
         name: "B612 Bold, the display's typeface",
         licence: "OFL-1.1",
@@ -32,6 +32,12 @@ const FOREIGN: [ForeignPart; 5] = [
         text: MIT,
     },
     ForeignPart {
+        name: "OpenBridge's palettes",
+        licence: "Apache-2.0",
+        notice: "Copyright (c) The OpenBridge authors",
+        text: APACHE,
+    },
+    ForeignPart {
         name: "the Rust standard library",
         licence: "MIT OR Apache-2.0",
         notice: "Copyright (c) The Rust Project Contributors",
@@ -42,6 +48,18 @@ const FOREIGN: [ForeignPart; 5] = [
         licence: "public domain",
         notice: "",
         text: include_str!("../foreign/sqlite.txt"),
+    },
+    ForeignPart {
+        name: "three.js",
+        licence: "MIT",
+        notice: "",
+        text: include_str!("../../../daemon/web/assets/vendor/three/LICENSE"),
+    },
+    ForeignPart {
+        name: "uPlot",
+        licence: "MIT",
+        notice: "",
+        text: include_str!("../../../daemon/web/assets/vendor/uplot/LICENSE"),
     },
     ForeignPart {
         name: "tag36h11, the code table of AprilTag",

@@ -216,8 +216,15 @@ impl Storage {
         }
     }
 
+    /// Takes in what a tick, or the end, gave for the journal.
+    pub fn take(&mut self, rounds: &[ShotRecord], events: &[ExerciseEvent], tracks: &TrackBlock) {
+        self.rounds(rounds);
+        self.exercise(events);
+        self.tracks.take(tracks);
+    }
+
     /// Takes in rounds that ended. Those that find no place are in the log, which may be on another disk.
-    pub fn rounds(&mut self, records: &[ShotRecord]) {
+    fn rounds(&mut self, records: &[ShotRecord]) {
         let rest = self.keep(records);
         if !rest.is_empty() {
             log::error!(
@@ -231,18 +238,13 @@ impl Storage {
     }
 
     /// Takes in events of the exercise. What finds no place is in the log.
-    pub fn exercise(&mut self, events: &[ExerciseEvent]) {
+    fn exercise(&mut self, events: &[ExerciseEvent]) {
         let room = EVENTS_WAITING_MAX.saturating_sub(self.events.len());
         let (kept, rest) = events.split_at(room.min(events.len()));
         self.events.extend(kept.iter().cloned());
         for event in rest {
             log::error!("event not in the journal: {event:?}");
         }
-    }
-
-    /// Takes in tracks of boats, rounds and gun.
-    pub fn tracks(&mut self, tracks: &TrackBlock) {
-        self.tracks.take(tracks);
     }
 
     /// Keeps rounds for the journal; the rest that finds no place.

@@ -135,7 +135,7 @@ fn tracks_wait_for_the_journal_too() {
     let mut all = TrackBlock::default();
     for i in 0..25 {
         let one = TrackBlock { samples: vec![sample(i)], rounds: Vec::new() };
-        storage.tracks(&one);
+        storage.take(&[], &[], &one);
         all.append(&one);
     }
     let (mut faults, mut events) = (FaultLog::new(None), Vec::new());

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bowwave_core::time::Time;
+use bowwave_core::{time::Time, world::track::TrackBlock};
 use bowwave_record::Run;
 use bowwave_trainer::{
     storage::{Storage, StorageOptions},
@@ -55,7 +55,7 @@ pub fn run(folder: &Path) {
             break;
         }
         say(&format!("fired {number}"));
-        storage.rounds(&[shot(number)]);
+        storage.take(&[shot(number)], &[], &TrackBlock::default());
         if number <= ROUNDS {
             poll(&mut storage);
             thread::sleep(Duration::from_micros(700));

@@ -1,0 +1,146 @@
+//! The page of a debrief.
+
+use bowwave_web::{Module, Page, THREE, UPLOT, UPLOT_STYLE};
+use maud::{Markup, html};
+use serde_json::Value;
+
+use crate::{data, run::ReviewedRun, tables};
+
+const STYLE: &str = include_str!("../assets/review.css");
+
+/// The page's own modules.
+const MODULES: [Module; 6] = [
+    Module { name: "main.js", source: include_str!("../assets/main.js") },
+    Module { name: "run.js", source: include_str!("../assets/run.js") },
+    Module { name: "clock.js", source: include_str!("../assets/clock.js") },
+    Module { name: "chart.js", source: include_str!("../assets/chart.js") },
+    Module { name: "view.js", source: include_str!("../assets/view.js") },
+    Module { name: "shots.js", source: include_str!("../assets/shots.js") },
+];
+
+/// The page of `run`, one file that needs no other.
+pub fn page(run: &ReviewedRun) -> String {
+    let (data, mut notes) = data::of(run);
+    if run.tracks.tracks.samples.is_empty() {
+        notes.push("the run is of a version that kept no tracks: chart and view stay empty".to_owned());
+    }
+    if run.tracks.missing > 0 {
+        notes.push(format!("tracks of about {} s are missing in the journal", run.tracks.missing));
+    }
+    if run.scored.unknown > 0 {
+        notes.push(format!("{} events are of a newer version and do not count", run.scored.unknown));
+    }
+    if !run.stored.finished {
+        notes.push("the run did not end as it should; what there is of it is shown".to_owned());
+    }
+    // No type of the data has a map with keys that are no text, nor a number that JSON cannot hold but as null.
+    let text = serde_json::to_string(&data).unwrap_or_default();
+    let score = serde_json::to_value(&run.scored).unwrap_or_default();
+    let title = format!("{} - run {}", run.stored.run.scenario, run.stored.id);
+    let modules: Vec<Module> = THREE.into_iter().chain([UPLOT]).chain(MODULES).collect();
+    let style = [UPLOT_STYLE, STYLE].concat();
+    let body = body(run, &score, &notes);
+    Page { title: &title, style: &style, body, data: &text, modules: &modules, main: "main.js" }.to_html()
+}
+
+fn body(run: &ReviewedRun, score: &Value, notes: &[String]) -> Markup {
+    html! {
+        (header(run, score))
+        main {
+            @if !notes.is_empty() {
+                section.panel.notes aria-label="Notes" { ul { @for note in notes { li { (note) } } } }
+            }
+            noscript { p.panel { "Chart and view need JavaScript. The tables do not." } }
+            div.stage.screen-only {
+                (view(run))
+                (chart())
+                (happenings())
+            }
+            (tables::all(run, score))
+        }
+        (time_line())
+    }
+}
+
+fn header(run: &ReviewedRun, score: &Value) -> Markup {
+    let points = score.pointer("/points").and_then(Value::as_f64);
+    html! {
+        header.bar {
+            h1.grow { (run.stored.run.scenario) " " small { "run " (run.stored.id) ", version " (run.stored.run.version) ", seed " (run.stored.run.seed) } }
+            @match points {
+                Some(points) => { span.badge { (format!("{points:.0} of 100 points")) } }
+                None => { span.badge { "no points: no events were kept" } }
+            }
+            label.screen-only { "Light " select id="theme" {
+                @for (value, name) in [("day", "Day"), ("bright", "Bright"), ("dusk", "Dusk"), ("night", "Night")] {
+                    option value=(value) { (name) }
+                }
+            } }
+        }
+    }
+}
+
+fn view(run: &ReviewedRun) -> Markup {
+    html! {
+        section.panel.view aria-labelledby="view-title" {
+            h2 id="view-title" { "View" }
+            div.tools role="group" aria-label="Viewpoint" {
+                button type="button" data-view="gun" aria-pressed="true" { "Gun" }
+                button type="button" data-view="above" aria-pressed="false" { "Above" }
+                button type="button" data-view="free" aria-pressed="false" { "Free" }
+                label { span.visually-hidden { "At a boat" } select id="view-boat" {
+                    option value="" { "At a boat ..." }
+                    @for (i, boat) in run.details.boats.iter().enumerate() { option value=(i) { (boat.name) " (" (boat.side) ")" } }
+                } }
+            }
+            canvas id="view" tabindex="0" role="img" aria-label="Boats, rounds and gun in three dimensions. Drag or use the arrow keys to turn, the wheel or + and - to come closer." {}
+            p.muted id="view-note" {}
+        }
+    }
+}
+
+fn chart() -> Markup {
+    html! {
+        section.panel.chart aria-labelledby="chart-title" {
+            h2 id="chart-title" { "Chart" }
+            div.tools role="group" aria-label="Scale" {
+                button type="button" id="chart-out" { "Wider" }
+                button type="button" id="chart-in" { "Closer" }
+                span.muted id="chart-scale" {}
+            }
+            canvas id="chart" role="img" aria-label="Chart about the gun, north up, in true scale: tracks of boats, bearing and field of view of the gun, rounds and where they ended." {}
+            p.muted { "Hostile boats are arrowheads, neutral ones squares. The sector is the camera's field of view, the line in it the barrel." }
+        }
+    }
+}
+
+fn happenings() -> Markup {
+    html! {
+        section.panel.happenings aria-labelledby="events-title" {
+            h2 id="events-title" { "Events" }
+            div.tools {
+                label { input type="checkbox" id="show-rounds" checked; " rounds" }
+                label { input type="checkbox" id="show-plain" checked; " minor events" }
+            }
+            div.scroll tabindex="0" aria-label="Events in their order" { table { tbody id="events" {} } }
+        }
+    }
+}
+
+fn time_line() -> Markup {
+    html! {
+        footer.bar.clock.screen-only {
+            button type="button" id="play" aria-keyshortcuts="Space" { "Play" }
+            button type="button" id="back" aria-label="Event before" aria-keyshortcuts="ArrowLeft" { "\u{2039}" }
+            button type="button" id="on" aria-label="Next event" aria-keyshortcuts="ArrowRight" { "\u{203a}" }
+            label { span.visually-hidden { "Speed" } select id="speed" {
+                @for speed in ["0.1", "0.25", "0.5", "1", "2", "5", "10"] { option value=(speed) selected[speed == "1"] { (speed) " x" } }
+            } }
+            div.grow.line {
+                canvas id="marks" aria-hidden="true" {}
+                input type="range" id="time" min="0" step="any" value="0" aria-label="Time in the run";
+            }
+            output id="now" for="time" { "0.0 s" }
+        }
+    }
+}
