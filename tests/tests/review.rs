@@ -15,10 +15,19 @@ use std::{
     path::{Path, PathBuf},
     process::Command,
     sync::OnceLock,
+    time::Instant,
 };
 
-use bowwave_record::{RunSelection, read_tracks};
+use bowwave_core::{
+    time::Time,
+    world::{
+        score::{Outcome, ShotRecord},
+        track::{PathPoint, RoundPath, TrackBlock, TrackPose, TrackSample},
+    },
+};
+use bowwave_record::{BoatDetails, CameraDetails, Journal, Run, RunDetails, RunSelection, read_tracks};
 use bowwave_tests::{bowwave, expect_code, program, said, write};
+use glam::{DQuat, DVec3};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -119,15 +128,14 @@ fn reviewed() -> &'static Reviewed {
     })
 }
 
-/// The value that the page has for each place in the score.
-fn cells(page: &str) -> BTreeMap<&str, &str> {
+/// The value that the page has for each place in the score, and the text that is shown for it.
+fn cells(page: &str) -> BTreeMap<&str, (&str, &str)> {
     page.split("data-score=\"")
         .skip(1)
         .filter_map(|rest| {
             let (pointer, rest) = rest.split_once('"')?;
-            let value =
-                rest.strip_prefix(" data-value=\"").and_then(|rest| rest.split_once('"')).map(|(v, _)| v);
-            Some((pointer, value?))
+            let (value, rest) = rest.strip_prefix(" data-value=\"")?.split_once("\">")?;
+            Some((pointer, (value, rest.split_once('<')?.0)))
         })
         .collect()
 }
@@ -160,7 +168,12 @@ fn each_number_of_the_score_is_on_the_page_as_it_is() {
             continue;
         }
         match cells.get(pointer.as_str()) {
-            Some(shown) => assert_eq!(*shown, value.to_string(), "{pointer}"),
+            Some((exact, shown)) => {
+                assert_eq!(*exact, value.to_string(), "{pointer}");
+                let digits = shown.split_once('.').map_or(0, |(_, digits)| digits.len());
+                let rounded = format!("{:.digits$}", value.as_f64().unwrap());
+                assert_eq!(*shown, rounded, "{pointer}");
+            }
             None => missing.push(pointer),
         }
     }
@@ -187,45 +200,96 @@ fn a_page_needs_no_other_file_and_what_is_not_there_is_named() {
     assert!(said(&nowhere).contains("no journal at no/such/folder"), "{}", said(&nowhere));
 }
 
-/// Places of a boat and of a round in the view that is moved, against the journal.
+/// The cubic through four places at equal times (Catmull and Rom 1974).
+fn cubic([a, b, c, d]: [DVec3; 4], part: f64) -> DVec3 {
+    let (from, to) = ((c - a) / 2.0, (d - b) / 2.0);
+    hermite([b, from, c, to], part)
+}
+
+/// The cubic from a place with a slope to another.
+fn hermite([a, from, b, to]: [DVec3; 4], s: f64) -> DVec3 {
+    let (s2, s3) = (s * s, s * s * s);
+    a * (2.0 * s3 - 3.0 * s2 + 1.0) + from * (s3 - 2.0 * s2 + s) + b * (3.0 * s2 - 2.0 * s3) + to * (s3 - s2)
+}
+
+fn vector([x, y, z]: [f32; 3]) -> DVec3 {
+    DVec3::new(x.into(), y.into(), z.into())
+}
+
+fn listed(value: &Value) -> Vec<f64> {
+    value.as_array().into_iter().flatten().filter_map(Value::as_f64).collect()
+}
+
+/// Boats, gun and rounds in the view that is moved, against the journal: at samples, and between them.
 #[test]
 fn a_browser_shows_boats_and_rounds_where_the_journal_has_them() {
     let run = reviewed();
     let Some(browser) = browser::Browser::open(&run.page) else { return };
     let journal = run.page.with_file_name("hits.sqlite");
     let tracks = read_tracks(&journal, RunSelection::Latest).unwrap().tracks;
-    let begin = browser.number("return bowwave.run.times[0]");
-    assert!(begin.abs() < 1e-9, "{begin}");
     let first = tracks.samples[0].time_ns;
+    browser.run("bowwave.view.setMode('above', null)");
     let mut compared = 0;
-    for sample in tracks.samples.iter().step_by(17) {
-        let time_s = (sample.time_ns - first) as f64 * 1e-9;
-        browser.run(&format!("bowwave.clock.set({time_s}); bowwave.view.setMode('above', null)"));
-        for (boat, pose) in sample.boats.iter().enumerate() {
-            let Some(pose) = pose else { continue };
-            for (axis, truth) in pose.position.iter().enumerate() {
-                let drawn = browser.number(&format!("return bowwave.view.drawnAt({boat})[{axis}]"));
+    for around in tracks.samples.windows(4).step_by(13) {
+        for part in [0.0, 0.4] {
+            let time_s = (around[1].time_ns - first) as f64 * 1e-9 + 0.05 * part;
+            browser.run(&format!("bowwave.clock.set({time_s})"));
+            for boat in 0..2 {
+                let poses: [TrackPose; 4] = std::array::from_fn(|i| around[i].boats[boat].unwrap());
+                let truth = cubic(poses.map(|pose| vector(pose.position)), part);
+                let turn = |pose: TrackPose| DQuat::from_array(pose.attitude.map(f64::from));
+                let attitude = turn(poses[1]).slerp(turn(poses[2]), part);
+                let drawn = listed(&browser.run(&format!("return bowwave.view.drawnAt({boat})")));
+                let place = DVec3::from_slice(&drawn);
+                assert!(place.distance(truth) < 0.01, "boat {boat} at {time_s} s: {place} {truth}");
+                let is = DQuat::from_slice(&drawn[3..]).normalize();
                 assert!(
-                    (drawn - f64::from(*truth)).abs() < 0.01,
-                    "boat {boat} at {time_s} s: {drawn} {truth}"
+                    is.angle_between(attitude.normalize()) < 1e-3,
+                    "boat {boat} at {time_s} s: {is} {attitude}"
                 );
                 compared += 1;
             }
         }
     }
-    assert!(compared > 30, "{compared}");
-    for (i, path) in tracks.rounds.iter().enumerate().step_by(3) {
-        let [a, b] = [&path.points[0], &path.points[1]];
-        let round = format!("bowwave.run.rounds.find((r) => r.shot === {})", path.shot);
-        for point in [a, b] {
-            let at = format!("{round}.at({round}.fired_s + {})", point.after_s);
-            for (axis, truth) in point.position.iter().enumerate() {
-                let drawn = browser.number(&format!("return {at}[{axis}]"));
-                assert!((drawn - f64::from(*truth)).abs() < 0.01, "round {i}: {drawn} {truth}");
-            }
+    assert!(compared > 40, "{compared}");
+    rounds_are_where_they_flew(&browser, &tracks);
+    gun_looks_where_it_looked(&browser, &tracks);
+}
+
+fn rounds_are_where_they_flew(browser: &browser::Browser, tracks: &TrackBlock) {
+    for path in tracks.rounds.iter().step_by(3) {
+        let [a, b] = [path.points[0], path.points[1]];
+        let span = f64::from(b.after_s - a.after_s);
+        let slopes =
+            [vector(a.position), vector(a.velocity) * span, vector(b.position), vector(b.velocity) * span];
+        for part in [0.0, 0.5, 1.0] {
+            let round = format!("bowwave.run.rounds.find((r) => r.shot === {})", path.shot);
+            let after_s = f64::from(a.after_s) + span * part;
+            let at = DVec3::from_slice(&listed(
+                &browser.run(&format!("return {round}.at({round}.fired_s + {after_s})")),
+            ));
+            assert!(at.distance(hermite(slopes, part)) < 0.01, "round {} {part}: {at}", path.shot);
         }
     }
     assert!(!tracks.rounds.is_empty());
+}
+
+/// The gun's view looks along the camera's axis, with its up.
+fn gun_looks_where_it_looked(browser: &browser::Browser, tracks: &TrackBlock) {
+    let sample = &tracks.samples[tracks.samples.len() / 2];
+    let time_s = (sample.time_ns - tracks.samples[0].time_ns) as f64 * 1e-9;
+    browser.run(&format!("bowwave.clock.set({time_s}); bowwave.view.setMode('gun', null)"));
+    let camera = sample.camera.unwrap();
+    let attitude = DQuat::from_array(camera.attitude.map(f64::from));
+    let elements = listed(&browser.run("return [...bowwave.view.camera.matrixWorld.elements]"));
+    let column = |i: usize| DVec3::from_slice(&elements[4 * i..]);
+    for (drawn, truth) in [
+        (-column(2), attitude * DVec3::Z),
+        (column(1), attitude * DVec3::NEG_Y),
+        (column(3), vector(camera.position)),
+    ] {
+        assert!(drawn.distance(truth) < 1e-3, "{drawn} {truth}");
+    }
 }
 
 #[test]
@@ -247,14 +311,129 @@ fn a_browser_scrubs_plays_steps_and_moves_without_an_error() {
         browser.click(&format!("[data-view={mode}]"));
         assert_eq!(browser.text(&format!("[data-view={mode}][aria-pressed=true]")).to_lowercase(), mode);
     }
-    // What a drag moves is the viewpoint.
+    // Keys move the viewpoint.
     browser.click("[data-view=free]");
-    let before = browser.number("return bowwave.view.camera.position.x + bowwave.view.camera.position.y");
-    browser.run("const c = document.getElementById('view'); c.focus(); for (const t of ['keydown']) c.dispatchEvent(new KeyboardEvent(t, {code: 'ArrowLeft', bubbles: true}))");
-    let moved = browser.number("return bowwave.view.camera.position.x + bowwave.view.camera.position.y");
-    assert!((moved - before).abs() > 1e-6, "{before} {moved}");
+    let eye = || {
+        let from = "bowwave.view.camera.position.clone().sub(bowwave.view.controls.target)";
+        DVec3::from_slice(&listed(&browser.run(&format!("return {from}.toArray()"))))
+    };
+    let before = eye();
+    browser.keys("#view", "\u{e012}"); // left arrow
+    let turned = eye();
+    let bearing = |v: DVec3| v.y.atan2(v.x);
+    let by_deg = (bearing(turned) - bearing(before)).to_degrees();
+    assert!(
+        (by_deg - 5.0).abs() < 0.1 && (turned.length() - before.length()).abs() < 0.01,
+        "{before} {turned}"
+    );
+    browser.keys("#view", "+");
+    assert!((eye().length() / before.length() - 0.87).abs() < 0.01, "{}", eye());
+    // An event that is not shown is not where the time stands.
+    browser.click("#show-plain");
+    browser.click("#show-rounds");
+    let hidden = "return [...document.querySelectorAll('#events tr[aria-current=true]')].filter((row) => row.hidden).length";
+    assert_eq!(browser.number(hidden), 0.0);
+    browser.click("#show-plain");
     let shown = browser.number("return document.querySelectorAll('#events tr[aria-current=true]').length");
     assert_eq!(shown, 1.0);
     let errors = browser.errors();
     assert!(errors.is_empty(), "{errors:?}");
+}
+
+/// Ten minutes with seven boats and 300 rounds, as a journal without a run.
+fn long_run(folder: &Path) -> PathBuf {
+    let names = ["skiff", "rhib", "dhow", "frigate", "skiff", "rhib", "dhow"];
+    let boat = |(i, model): (usize, &&str)| BoatDetails {
+        name: format!("{model}-{i}"),
+        side: if i < 4 { "hostile" } else { "neutral" }.to_owned(),
+        model: (*model).to_owned(),
+        ..BoatDetails::default()
+    };
+    let details = RunDetails {
+        boats: names.iter().enumerate().map(boat).collect(),
+        eye_height_m: 6.0,
+        camera: CameraDetails {
+            size: [1280, 720],
+            focal: [1100.0; 2],
+            centre: [640.0, 360.0],
+            bore: [0.0, 0.0, 1.0],
+        },
+        ..RunDetails::default()
+    };
+    let path = folder.join("hits.sqlite");
+    let run = Run { details: Some(details.to_json()), scenario: "ten minutes".to_owned(), ..Run::default() };
+    let journal = Journal::open(&path, &run).unwrap();
+    for second in 0..600u32 {
+        let block = block_of(second, names.len());
+        while journal.tracks(u64::from(second) + 1, block.clone()).is_err() {
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        if let Some(path) = block.rounds.first() {
+            let fired = Time::from_ns(path.fired_ns);
+            let outcome =
+                Outcome::Miss { boat: Some("skiff-0".to_owned()), miss_m: 2.0, time: fired, range_m: 300.0 };
+            let shot = path.shot;
+            journal
+                .shot(&ShotRecord {
+                    shot,
+                    fired,
+                    muzzle: DVec3::Z * 6.0,
+                    bore: DVec3::Y,
+                    pose_age_ns: 0,
+                    outcome,
+                })
+                .unwrap();
+        }
+    }
+    journal.finish().unwrap();
+    path
+}
+
+/// A second of boats on circles; a round every other second.
+fn block_of(second: u32, boats: usize) -> TrackBlock {
+    let pose = |boat: usize, time_s: f32| {
+        let (far, turn) = (120.0 + 40.0 * boat as f32, 0.05 * time_s + boat as f32);
+        let position = [far * turn.sin(), far * turn.cos(), 0.2 * (time_s + boat as f32).sin()];
+        Some(TrackPose { position, attitude: [0.0, 0.0, (turn / 2.0).sin(), (turn / 2.0).cos()] })
+    };
+    let sample = |k: u32| {
+        let number = second * 20 + k;
+        let time_s = number as f32 / 20.0;
+        let boats = (0..boats).map(|boat| pose(boat, time_s)).collect();
+        TrackSample { time_ns: i64::from(number) * 50_000_000, camera: pose(0, time_s), boats }
+    };
+    let point = |k: u32| PathPoint {
+        after_s: 0.1 * k as f32,
+        position: [0.0, 80.0 * k as f32, 5.0],
+        velocity: [0.0, 800.0, 0.0],
+    };
+    let path = RoundPath {
+        shot: u64::from(second / 2 + 1),
+        fired_ns: i64::from(second) * 1_000_000_000,
+        points: (0..20).map(point).collect(),
+    };
+    let rounds = if second.is_multiple_of(2) { vec![path] } else { Vec::new() };
+    TrackBlock { samples: (0..20).map(sample).collect(), rounds }
+}
+
+/// Ten minutes stay small and are interactive. The times are printed, since a test judges none.
+#[test]
+fn ten_minutes_with_seven_boats_and_300_rounds_stay_small() {
+    let folder = tempfile::tempdir().unwrap();
+    let journal = long_run(folder.path());
+    let begun = Instant::now();
+    expect_code(&bowwave(["review", journal.to_str().unwrap()]), 0);
+    let made_s = begun.elapsed().as_secs_f64();
+    let page = folder.path().join("review-1.html");
+    let bytes = fs::metadata(&page).unwrap().len();
+    println!("made in {made_s:.2} s, {:.1} MB", bytes as f64 / 1e6);
+    assert!(bytes < 30_000_000, "{bytes} bytes");
+    let Some(browser) = browser::Browser::open(&page) else { return };
+    assert_eq!(browser.number("return document.querySelectorAll('#rounds tr').length"), 300.0);
+    assert_eq!(browser.number("return bowwave.run.times.length"), 12000.0);
+    let ready_s = browser.number("return performance.getEntriesByName('interactive')[0].startTime") / 1e3;
+    let scrub = "const from = performance.now(); for (let i = 0; i < 60; i++) bowwave.clock.set(i * 10); return performance.now() - from";
+    let scrub_ms = browser.number(scrub) / 60.0;
+    println!("interactive after {ready_s:.2} s, {scrub_ms:.1} ms for each place that is scrubbed to");
+    assert!(browser.errors().is_empty());
 }

@@ -320,6 +320,9 @@ pub struct ReviewArgs {
     /// The page to write (HTML); without it review-N.html beside the journal
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Replace what is at --out
+    #[arg(long, requires = "out")]
+    pub force: bool,
     /// Open the page in the desktop's browser
     #[arg(long)]
     pub open: bool,

@@ -8,12 +8,21 @@ use std::{
 use anyhow::{Context, Result};
 use bowwave_review::{ReviewedRun, page};
 
-use crate::{cli::ReviewArgs, hits::journal_at, new_file::write_new, outcome::Outcome, stdout};
+use crate::{
+    cli::ReviewArgs,
+    hits::journal_at,
+    new_file::{refuse_to_replace, write_new},
+    outcome::Outcome,
+    stdout,
+};
 
 /// Makes the page, says where it is, and opens it where that is wanted.
 pub fn run(arguments: &ReviewArgs) -> Result<Outcome> {
     let journal = journal_at(&arguments.run)?;
     let reviewed = ReviewedRun::read(&journal, arguments.number)?;
+    if let Some(out) = &arguments.out {
+        refuse_to_replace(out, arguments.force)?;
+    }
     let path = arguments.out.clone().unwrap_or_else(|| beside(&journal, reviewed.stored.id));
     write_new(&path, &page(&reviewed))?;
     stdout::print(format!("{}\n", path.display()))?;

@@ -550,10 +550,15 @@ fn tracks_come_back_as_they_were_and_gaps_are_counted() {
     let stored = read_tracks(&path, RunSelection::Latest).unwrap();
     assert_eq!((&stored.tracks, stored.missing), (&expected, 2));
     assert_eq!(read_runs(&path).unwrap()[0].run.details.as_deref(), Some("{}"));
+    // So is what is missing before the first that there is.
+    let late = Journal::open(&path, &run()).unwrap();
+    late.tracks(4, block(4)).unwrap();
+    late.finish().unwrap();
+    assert_eq!(read_tracks(&path, RunSelection::Latest).unwrap().missing, 3);
     // One that is damaged is a gap, and the others stay.
     rusqlite::Connection::open(&path)
         .unwrap()
-        .execute("UPDATE tracks SET block = x'93ff00' WHERE number = 2", [])
+        .execute("UPDATE tracks SET block = x'93ff00' WHERE run = 1 AND number = 2", [])
         .unwrap();
     let damaged = read_tracks(&path, RunSelection::Run(1)).unwrap();
     assert_eq!((damaged.tracks.samples.len(), damaged.missing), (20, 3));
@@ -565,10 +570,10 @@ fn tracks_come_back_as_they_were_and_gaps_are_counted() {
 #[test]
 fn details_of_runs_are_read_by_versions_that_know_less_or_more() {
     let known = RunDetails { keep_off_m: 200.0, ..RunDetails::default() };
-    assert_eq!(RunDetails::from_json(Some(&known.to_json())), known);
+    assert_eq!(RunDetails::from_json(&known.to_json()), Some(known.clone()));
     let later = r#"{"keep_off_m": 200.0, "of_a_later_version": [1]}"#;
-    assert_eq!(RunDetails::from_json(Some(later)), known);
-    for none in [None, Some(""), Some("[]")] {
-        assert_eq!(RunDetails::from_json(none), RunDetails::default());
+    assert_eq!(RunDetails::from_json(later), Some(known));
+    for none in ["", "7", "{\"boats\": 3}"] {
+        assert_eq!(RunDetails::from_json(none), None, "{none}");
     }
 }

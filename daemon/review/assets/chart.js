@@ -212,6 +212,7 @@ export class Chart {
           c.lineTo(x + 5, y + 5);
           c.moveTo(x + 5, y - 5);
           c.lineTo(x - 5, y + 5);
+          if (round.weight === "alarm") c.rect(x - 7, y - 7, 14, 14);
         } else c.arc(x, y, 2.5, 0, 2 * Math.PI);
         c.stroke();
       }

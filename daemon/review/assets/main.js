@@ -16,7 +16,7 @@ const chart = new Chart(by("chart"), by("chart-scale"), run);
 /** @type {View | null} */
 let view = null;
 try {
-  view = new View(by("view"), run);
+  view = new View(by("view"), by("view-note"), run);
 } catch (error) {
   by("view-note").textContent = "This browser draws nothing in three dimensions (WebGL): switch it on, or use the chart.";
   console.warn(error);
@@ -55,6 +55,7 @@ function filter() {
   rows.forEach((row, i) => {
     row.hidden = (!rounds && happenings[i].shot !== null) || (!plain && happenings[i].weight === "plain");
   });
+  draw();
 }
 by("show-rounds").addEventListener("change", filter);
 by("show-plain").addEventListener("change", filter);
@@ -141,8 +142,10 @@ function drawMarks() {
     const x = (happening.time_s / run.end_s) * canvas.clientWidth;
     const tones = { alarm: "alert-alarm-color", good: "alert-running-color", plain: "instrument-tick-mark-tertiary-color" };
     c.fillStyle = colour(canvas, tones[/** @type {"alarm" | "good" | "plain"} */ (happening.weight)]);
-    const high = happening.weight === "plain" ? 5 : 14;
+    const high = { alarm: 14, good: 9, plain: 5 }[/** @type {"alarm" | "good" | "plain"} */ (happening.weight)];
     c.fillRect(x - 1, 14 - high, 2, high);
+    // An alarm has a flag: colour alone says nothing.
+    if (happening.weight === "alarm") c.fillRect(x, 0, 6, 5);
   }
 }
 
@@ -155,7 +158,8 @@ function draw() {
   by("now").textContent = `${now.toFixed(1)} s`;
   chart.draw(now);
   view?.draw(now);
-  const newest = happenings.filter((happening) => happening.time_s <= now + 1e-6).length - 1;
+  let newest = happenings.filter((happening) => happening.time_s <= now + 1e-6).length - 1;
+  while (newest >= 0 && rows[newest].hidden) newest--;
   if (newest !== current) {
     rows[current]?.removeAttribute("aria-current");
     rows[newest]?.setAttribute("aria-current", "true");
@@ -179,5 +183,6 @@ by("theme").addEventListener("change", (event) => {
 });
 window.addEventListener("resize", dress);
 dress();
+performance.mark("interactive");
 // Tests and those who look into the page find the run here.
 Object.assign(window, { bowwave: { run, clock, chart, view } });

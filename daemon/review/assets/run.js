@@ -5,8 +5,8 @@
  * @typedef {{name: string, side: string, model: string, low_m: number[], high_m: number[]}} Boat
  * @typedef {{positions: string, colours: string, indices: string}} CodedMesh
  * @typedef {{size: number[], focal: number[], centre: number[], bore: number[]}} Camera
- * @typedef {{shot: number, fired_s: number, weight: string, words: string, boat: number | null, muzzle: number[], bore: number[],
- *   error_m: number[] | null, path: string}} CodedRound
+ * @typedef {{shot: number, fired_s: number, weight: string, words: string, boat: number | null, error_m: number[] | null,
+ *   path: string}} CodedRound
  * @typedef {{time_s: number, weight: string, words: string, boat: number | null}} RunEvent
  * @typedef {{end_s: number, boats: Boat[], camera: Camera, keep_off_m: number, eye_height_m: number,
  *   tracks: {time_s: string, camera: string, boats: string}, rounds: CodedRound[], events: RunEvent[], meshes: Record<string, CodedMesh>}} PageData
@@ -62,8 +62,6 @@ class Round {
     this.weight = coded.weight;
     this.words = coded.words;
     this.boat = coded.boat;
-    this.muzzle = coded.muzzle;
-    this.bore = coded.bore;
     this.error_m = coded.error_m;
     this.points = new Float32Array(decoded(coded.path));
     this.count = this.points.length / POSE;
@@ -128,15 +126,17 @@ export class Run {
 
   /** @param {Float32Array} poses @param {number} count @param {number} which @param {number} time_s @returns {Pose | null} */
   poseIn(poses, count, which, time_s) {
-    /** Longer without a sample is a gap, seconds. */
-    const GAP = 0.5;
+    /** Longer without a sample is a gap, seconds: two steps, and a little more. Within it only the nearest moment of a sample counts. */
+    const [GAP, MOMENT] = [0.12, 0.03];
     const next = countUpTo(this.times, time_s);
     const from = Math.max(next - 1, 0);
     const to = Math.min(next, this.times.length - 1);
     if (this.times.length === 0) return null;
     const span = this.times[to] - this.times[from];
-    if (Math.abs(time_s - this.times[from]) > GAP && Math.abs(time_s - this.times[to]) > GAP) return null;
-    const s = span > 0 ? (time_s - this.times[from]) / span : 0;
+    const [before, after] = [time_s - this.times[from], this.times[to] - time_s];
+    const isGap = span > GAP || span === 0;
+    if (isGap && Math.abs(before) > MOMENT && Math.abs(after) > MOMENT) return null;
+    const s = isGap ? (Math.abs(before) <= Math.abs(after) ? 0 : 1) : before / span;
     /** @param {number} sample */
     const at = (sample) => (sample * count + which) * POSE;
     const [b, c] = [at(from), at(to)];

@@ -12,9 +12,10 @@ const SPLASH = 2;
 const ROUNDS_MOST = 64;
 
 export class View {
-  /** @param {HTMLCanvasElement} canvas @param {Run} run */
-  constructor(canvas, run) {
+  /** @param {HTMLCanvasElement} canvas @param {HTMLElement} says @param {Run} run */
+  constructor(canvas, says, run) {
     this.canvas = canvas;
+    this.says = says;
     this.run = run;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
     this.scene = new THREE.Scene();
@@ -22,9 +23,10 @@ export class View {
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.maxPolarAngle = 0.499 * Math.PI;
-    this.controls.listenToKeyEvents(canvas);
+    canvas.addEventListener("keydown", (event) => this.key(event));
     this.controls.addEventListener("start", () => {
       if (this.mode === "gun") this.setMode("free", null);
+      else if (this.mode === "above") this.changed((this.mode = "free"));
     });
     this.controls.addEventListener("change", () => this.render());
     /** @type {"gun" | "above" | "free" | "boat"} */
@@ -99,12 +101,14 @@ export class View {
     const tracer = new THREE.CylinderGeometry(0.12, 0.12, 1, 6);
     const splash = new THREE.ConeGeometry(0.45, 3, 10);
     const spark = new THREE.SphereGeometry(0.2, 12, 8);
+    const wrong = new THREE.BoxGeometry(0.5, 0.5, 0.5);
     for (let i = 0; i < ROUNDS_MOST; i++) {
       const line = new THREE.Mesh(tracer, new THREE.MeshBasicMaterial({ color: 0xffb02e }));
       const cone = new THREE.Mesh(splash, new THREE.MeshBasicMaterial({ color: 0xf4f8fa, transparent: true, opacity: 0.85 }));
       cone.rotation.x = Math.PI / 2;
       const strike = new THREE.Mesh(spark, new THREE.MeshBasicMaterial({ color: 0xff6a00 }));
-      flights.add(line, cone, strike);
+      const mistake = new THREE.Mesh(wrong, new THREE.MeshBasicMaterial({ color: 0xe30019 }));
+      flights.add(line, cone, strike, mistake);
     }
     this.scene.add(flights);
     return flights;
@@ -112,6 +116,7 @@ export class View {
 
   /** @param {"gun" | "above" | "free" | "boat"} mode @param {number | null} boat */
   setMode(mode, boat) {
+    const was = this.mode;
     this.mode = mode;
     this.followed = boat;
     if (mode === "above") {
@@ -119,12 +124,45 @@ export class View {
       const far = 1.9 * Math.max(100, ...places.map((place) => Math.hypot(place[0], place[1])));
       this.camera.position.set(0, -0.45 * far, 0.9 * far);
       this.controls.target.set(0, 0, 0);
-    } else if (mode === "free" && this.controls.target.lengthSq() === 0) {
+    } else if (mode === "free" && was === "gun") {
       const ahead = new THREE.Vector3(0, 0, -1).applyQuaternion(this.camera.quaternion);
       this.controls.target.copy(this.camera.position).addScaledVector(ahead, 150).setZ(1);
     }
+    if (mode === "boat" && boat !== null) this.standBehind(boat);
     this.changed(mode);
     this.draw(this.time_s);
+  }
+
+  /** @param {number} boat */
+  standBehind(boat) {
+    const pose = this.run.boatAt(boat, this.time_s);
+    if (!pose) return;
+    const ahead = Run.direction(pose, [1, 0, 0]);
+    const { low_m, high_m } = this.run.boats[boat];
+    const back = 2.2 * (high_m[0] - low_m[0]);
+    this.controls.target.set(pose.position[0], pose.position[1], 1);
+    this.camera.position.set(pose.position[0] - ahead[0] * back, pose.position[1] - ahead[1] * back, 1 + 0.5 * back);
+  }
+
+  /** Turns about what is looked at, or comes closer to it.
+   * @param {KeyboardEvent} event */
+  key(event) {
+    const TURN = Math.PI / 36;
+    /** @type {Record<string, [number, number, number]>} to the left, up, and times as far */
+    const keys = { ArrowLeft: [TURN, 0, 1], ArrowRight: [-TURN, 0, 1], ArrowUp: [0, TURN, 1], ArrowDown: [0, -TURN, 1], "+": [0, 0, 0.87], "-": [0, 0, 1.15] };
+    const way = keys[event.key];
+    if (!way) return;
+    event.preventDefault();
+    if (this.mode === "gun") this.setMode("free", null);
+    const from = this.camera.position.clone().sub(this.controls.target);
+    const flat = Math.hypot(from.x, from.y);
+    const bearing = Math.atan2(from.y, from.x) + way[0];
+    const up = Math.min(Math.max(Math.atan2(from.z, flat) + way[1], 0.01), 1.55);
+    const far = Math.min(Math.max(from.length() * way[2], 2), 20000);
+    from.set(Math.cos(bearing) * Math.cos(up), Math.sin(bearing) * Math.cos(up), Math.sin(up)).multiplyScalar(far);
+    this.camera.position.copy(this.controls.target).add(from);
+    this.controls.update();
+    this.render();
   }
 
   /** @param {number} time_s */
@@ -164,7 +202,7 @@ export class View {
       const at = round.at(time_s);
       const end = round.end();
       if (at) {
-        const line = this.flights.children[3 * used++];
+        const line = this.flights.children[4 * used++];
         const from = new THREE.Vector3(...(round.at(Math.max(time_s - 1 / 60, round.fired_s)) ?? at));
         const to = new THREE.Vector3(...at);
         const length = Math.max(from.distanceTo(to), 0.5);
@@ -173,8 +211,9 @@ export class View {
         line.position.copy(from).lerp(to, 0.5);
         line.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), to.sub(from).normalize());
       } else if (end && since_end >= 0) {
-        const isHit = round.weight !== "plain";
-        const cone = this.flights.children[3 * used++ + (isHit ? 2 : 1)];
+        const kind = { plain: 1, good: 2, alarm: 3 }[/** @type {"plain" | "good" | "alarm"} */ (round.weight)];
+        const isHit = kind > 1;
+        const cone = this.flights.children[4 * used++ + kind];
         const rise = Math.sin((Math.PI * since_end) / SPLASH);
         cone.visible = true;
         cone.position.set(end[0], end[1], isHit ? end[2] : end[2] + 1.5 * rise);
@@ -189,30 +228,37 @@ export class View {
   stand(time_s) {
     const inGun = this.mode === "gun";
     this.gun.visible = !inGun;
-    this.controls.enabled = !inGun || this.run.times.length > 0;
+    this.camera.clearViewOffset();
     if (inGun) {
       const pose = this.run.cameraAt(time_s);
+      this.says.textContent = pose ? "The whole width of the camera's picture; over and under it more is seen than the shooter saw." : "Where the gun pointed is not known at this time.";
+      this.canvas.style.visibility = pose ? "visible" : "hidden";
       if (!pose) return;
-      const { size, focal } = this.run.camera;
-      // All of the camera's picture, whatever the view's shape: what is seen beside it the shooter did not see.
+      const { size, focal, centre } = this.run.camera;
       const shape = this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1);
       const tangent = focal[1] > 0 ? Math.max(size[1] / focal[1], size[0] / focal[0] / shape) / 2 : 0.4;
       this.camera.fov = (2 * Math.atan(tangent) * 180) / Math.PI;
+      if (focal[1] > 0) {
+        // The principal point is not in the middle of every picture.
+        const [w, h] = [this.canvas.clientWidth, this.canvas.clientHeight];
+        const scale = h / (2 * tangent * focal[1]);
+        this.camera.setViewOffset(w, h, (size[0] / 2 - centre[0]) * scale, (size[1] / 2 - centre[1]) * scale, w, h);
+      }
       this.camera.position.fromArray(pose.position);
       // three's cameras look along -z with y up, the gun's along z with y down.
       this.camera.quaternion.fromArray(pose.attitude).multiply(new THREE.Quaternion(1, 0, 0, 0));
-      this.controls.target.set(0, 0, 0);
       return;
     }
+    this.says.textContent = "";
+    this.canvas.style.visibility = "visible";
     this.camera.fov = 50;
     if (this.mode === "boat" && this.followed !== null) {
       const pose = this.run.boatAt(this.followed, time_s);
       if (!pose) return;
-      const ahead = Run.direction(pose, [1, 0, 0]);
-      const boat = this.run.boats[this.followed];
-      const back = 2.2 * (boat.high_m[0] - boat.low_m[0]);
-      this.camera.position.set(pose.position[0] - ahead[0] * back, pose.position[1] - ahead[1] * back, pose.position[2] + 0.45 * back);
-      this.controls.target.set(pose.position[0] + ahead[0] * back, pose.position[1] + ahead[1] * back, 1);
+      // The eye goes with the boat and keeps what it was turned to.
+      const moved = new THREE.Vector3(pose.position[0], pose.position[1], 1).sub(this.controls.target);
+      this.camera.position.add(moved);
+      this.controls.target.add(moved);
     }
     this.controls.update();
   }
@@ -239,9 +285,11 @@ export class View {
     this.renderer.render(this.scene, this.camera);
   }
 
-  /** @param {number} boat @returns {number[]} where it is drawn, for tests */
+  /** Where a boat is drawn, for tests: its place and its attitude x, y, z, w; null where it is not.
+   * @param {number} boat @returns {number[] | null} */
   drawnAt(boat) {
-    return this.boats[boat].position.toArray();
+    const { visible, position, quaternion } = this.boats[boat];
+    return visible ? [...position.toArray(), ...quaternion.toArray()] : null;
   }
 }
 

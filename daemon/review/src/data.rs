@@ -1,6 +1,6 @@
 //! Data of a run for the page's scripts.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, path::Path};
 
 use bowwave_core::world::track::{RoundPath, TrackPose, TrackSample};
 use bowwave_record::{CameraDetails, RunDetails};
@@ -55,8 +55,6 @@ struct PageRound {
     words: String,
     /// Number of the boat that it struck or came closest to.
     boat: Option<usize>,
-    muzzle: [f64; 3],
-    bore: [f64; 3],
     /// Error at the target, metres to the right and over, where a miss was explained.
     error_m: Option<[f64; 2]>,
     /// Seven f32 a point: seconds since it was fired, place, velocity. Empty where its path was not kept.
@@ -74,14 +72,13 @@ struct PageEvent {
 /// The data of `run`, and what there is to say of it.
 pub fn of(run: &ReviewedRun) -> (PageData<'_>, Vec<String>) {
     let RunDetails { boats, camera, keep_off_m, eye_height_m, .. } = &run.details;
-    let (meshes, notes) = meshes::of_boats(boats);
-    let boat = |boat: &'_ bowwave_record::BoatDetails| (boat.low_m, boat.high_m);
+    let (meshes, notes) = meshes::of_boats(boats, Path::new(&run.details.models_base));
     let data = PageData {
         end_s: run.seconds(run.end_ns()),
         boats: boats
             .iter()
             .map(|b| {
-                let (low_m, high_m) = boat(b);
+                let (low_m, high_m) = (b.low_m, b.high_m);
                 PageBoat { name: &b.name, side: &b.side, model: &b.model, low_m, high_m }
             })
             .collect(),
@@ -133,8 +130,6 @@ fn rounds(run: &ReviewedRun) -> Vec<PageRound> {
             weight,
             words,
             boat: words::boat_of(record).and_then(|name| run.boat(name)),
-            muzzle: record.muzzle.to_array(),
-            bore: record.bore.to_array(),
             error_m: explained.filter(|round| round.was_aimed).map(|round| round.error_m),
             path: base64_of(&path),
         }
@@ -144,7 +139,8 @@ fn rounds(run: &ReviewedRun) -> Vec<PageRound> {
 
 fn events(run: &ReviewedRun) -> Vec<PageEvent> {
     let of_event = |event: &bowwave_core::world::exercise::ExerciseEvent| {
-        let (weight, words, boat) = words::event(&event.fact)?;
+        let is_neutral = |name: &str| run.boat(name).is_some_and(|i| run.details.boats[i].side == "neutral");
+        let (weight, words, boat) = words::event(&event.fact, is_neutral)?;
         Some(PageEvent {
             time_s: run.seconds(event.time.ns()),
             weight,

@@ -22,15 +22,14 @@ pub struct Mesh {
     indices: String,
 }
 
-/// The meshes of boats by the names of their models, and what there is to say of those that could not be loaded. Files are looked for from
-/// the folder that the command is given in.
-pub fn of_boats(boats: &[BoatDetails]) -> (BTreeMap<&str, Mesh>, Vec<String>) {
+/// The meshes of boats by the names of their models, and what there is to say of those that could not be loaded. Files are named from `base`.
+pub fn of_boats<'a>(boats: &'a [BoatDetails], base: &Path) -> (BTreeMap<&'a str, Mesh>, Vec<String>) {
     let (mut meshes, mut notes) = (BTreeMap::new(), Vec::new());
     for boat in boats {
         if meshes.contains_key(boat.model.as_str()) {
             continue;
         }
-        let loaded = resolve(&boat.model, Path::new("."));
+        let loaded = resolve(&boat.model, base);
         match loaded.as_ref().ok().filter(|model| is_same_size(model, boat)) {
             Some(model) => drop(meshes.insert(boat.model.as_str(), Mesh::of(model))),
             None => {

@@ -21,17 +21,14 @@ const MODULES: [Module; 6] = [
 /// The page of `run`, one file that needs no other.
 pub fn page(run: &ReviewedRun) -> String {
     let (data, mut notes) = data::of(run);
-    if run.tracks.tracks.samples.is_empty() {
-        notes.push("the run is of a version that kept no tracks: chart and view stay empty".to_owned());
-    }
-    if run.tracks.missing > 0 {
-        notes.push(format!("tracks of about {} s are missing in the journal", run.tracks.missing));
-    }
+    notes.extend(track_notes(run));
     if run.scored.unknown > 0 {
         notes.push(format!("{} events are of a newer version and do not count", run.scored.unknown));
     }
     if !run.stored.finished {
-        notes.push("the run did not end as it should; what there is of it is shown".to_owned());
+        notes.push(
+            "the run still goes on, or did not end as it should; what there is of it is shown".to_owned(),
+        );
     }
     // No type of the data has a map with keys that are no text, nor a number that JSON cannot hold but as null.
     let text = serde_json::to_string(&data).unwrap_or_default();
@@ -41,6 +38,34 @@ pub fn page(run: &ReviewedRun) -> String {
     let style = [UPLOT_STYLE, STYLE].concat();
     let body = body(run, &score, &notes);
     Page { title: &title, style: &style, body, data: &text, modules: &modules, main: "main.js" }.to_html()
+}
+
+/// Notes on tracks that are missing.
+fn track_notes(run: &ReviewedRun) -> Vec<String> {
+    /// The last samples of a run that ended well are no further from its last event than this, nanoseconds.
+    const NEAR_NS: i64 = 2_000_000_000;
+    if run.stored.run.details.is_none() {
+        return vec!["the run is of a version that kept no tracks: chart and view stay empty".to_owned()];
+    }
+    let mut notes = Vec::new();
+    if run.has_unreadable_details {
+        notes.push("the journal's details of the run cannot be read: its boats are not shown".to_owned());
+    }
+    let Some(last) = run.tracks.tracks.samples.last() else {
+        notes.push(
+            "the journal has no tracks of the run: chart and view stay empty; the log of the run says why"
+                .to_owned(),
+        );
+        return notes;
+    };
+    if run.tracks.missing > 0 {
+        notes.push(format!("tracks of about {} s are missing in the journal", run.tracks.missing));
+    }
+    if run.end_ns().saturating_sub(last.time_ns) > NEAR_NS {
+        let (end_s, tracked_s) = (run.seconds(run.end_ns()), run.seconds(last.time_ns));
+        notes.push(format!("tracks end at {tracked_s:.0} s, and the run went on to {end_s:.0} s"));
+    }
+    notes
 }
 
 fn body(run: &ReviewedRun, score: &Value, notes: &[String]) -> Markup {
@@ -109,7 +134,8 @@ fn chart() -> Markup {
                 span.muted id="chart-scale" {}
             }
             canvas id="chart" role="img" aria-label="Chart about the gun, north up, in true scale: tracks of boats, bearing and field of view of the gun, rounds and where they ended." {}
-            p.muted { "Hostile boats are arrowheads, neutral ones squares. The sector is the camera's field of view, the line in it the barrel." }
+            p.muted { "Hostile boats are arrowheads, neutral ones squares. The sector is the camera's field of view, the line in it the barrel; the dashed ring is the range to be kept. Rounds that \
+                        struck leave a cross, on a neutral boat a cross in a square; others a ring." }
         }
     }
 }

@@ -1,6 +1,6 @@
 //! A run as its journal has it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use bowwave_record::{
     JournalError, RunDetails, RunSelection, StoredRun, StoredTracks, read_runs, read_tracks,
@@ -11,12 +11,12 @@ use crate::scored::ScoredRun;
 /// Everything that a journal has of a run.
 #[derive(Clone, Debug)]
 pub struct ReviewedRun {
-    /// The journal.
-    pub journal: PathBuf,
     /// Number, scenario and times.
     pub stored: StoredRun,
-    /// Boats, camera and ranges to be kept; defaults for runs of versions that kept none.
+    /// Boats, camera and ranges to be kept; defaults where the journal has none that can be read.
     pub details: RunDetails,
+    /// The journal has details, but not such as this version can read.
+    pub has_unreadable_details: bool,
     /// Where boats, rounds and gun were.
     pub tracks: StoredTracks,
     /// Score, rounds and events.
@@ -29,24 +29,22 @@ impl ReviewedRun {
     /// # Errors
     /// Where the journal cannot be read, has no run at all, or none of that number.
     pub fn read(path: &Path, number: Option<i64>) -> Result<Self, JournalError> {
-        let runs = number.map_or(RunSelection::Latest, RunSelection::Run);
+        let mut all = read_runs(path)?;
+        // One number for all that is read: another run may begin meanwhile.
+        let id = number.or_else(|| all.last().map(|stored| stored.id)).unwrap_or(0);
+        let runs = RunSelection::Run(id);
         // Names the runs that there are where this one is not.
         let tracks = read_tracks(path, runs)?;
         let scored = ScoredRun::read(path, runs)?;
-        let all = read_runs(path)?;
-        let found = match number {
-            Some(number) => all.into_iter().find(|stored| stored.id == number),
-            None => all.into_iter().next_back(),
-        };
-        let no_such = || JournalError::NoSuchRun {
-            path: path.into(),
-            run: number.unwrap_or_default(),
-            first: None,
-            last: None,
-        };
+        let (first, last) = (all.first().map(|stored| stored.id), all.last().map(|stored| stored.id));
+        let found = all.iter().position(|stored| stored.id == id).map(|at| all.swap_remove(at));
+        let no_such = || JournalError::NoSuchRun { path: path.into(), run: id, first, last };
         let stored = found.ok_or_else(no_such)?;
-        let details = RunDetails::from_json(stored.run.details.as_deref());
-        Ok(Self { journal: path.into(), stored, details, tracks, scored })
+        let kept = stored.run.details.as_deref();
+        let details = kept.and_then(RunDetails::from_json);
+        let has_unreadable_details = kept.is_some() && details.is_none();
+        let details = details.unwrap_or_default();
+        Ok(Self { stored, details, has_unreadable_details, tracks, scored })
     }
 
     /// The run's beginning on the session's clock, nanoseconds: its first sample, else its first event or round.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use bowwave_core::{text::one_line, world::score::Outcome};
+use bowwave_record::RunDetails;
 use maud::{Markup, html};
 use serde_json::Value;
 
@@ -16,9 +17,7 @@ pub fn all(run: &ReviewedRun, score: &Value) -> Markup {
     let cells = Cells { score };
     html! {
         div.tables {
-            @if let Some(briefing) = &run.details.briefing {
-                section.panel { h2 { "Briefing" } @for line in briefing.lines() { p { (line) } } }
-            }
+            (circumstances(run))
             (points(&cells))
             (breaches(&cells))
             (misses(&cells))
@@ -26,6 +25,35 @@ pub fn all(run: &ReviewedRun, score: &Value) -> Markup {
             (group(run))
             (boats(&cells))
             (rounds(run, score))
+        }
+    }
+}
+
+/// Briefing, weapon, wind and ranges.
+fn circumstances(run: &ReviewedRun) -> Markup {
+    let RunDetails {
+        briefing,
+        weapon,
+        keep_off_m,
+        self_defence_m,
+        eye_height_m,
+        wind_m_s: [east, north],
+        ..
+    } = &run.details;
+    let from_deg = (-east).atan2(-north).to_degrees().rem_euclid(360.0);
+    html! {
+        section.panel {
+            h2 { "Exercise" }
+            @for line in briefing.iter().flat_map(|text| text.lines()) { p { (line) } }
+            table { tbody {
+                @if let Some(weapon) = weapon { tr { th { "Weapon" } td { (weapon) } } }
+                @if *keep_off_m > 0.0 { tr { th { "Range to be kept" } td { (format!("{keep_off_m:.0} m")) } } }
+                @if *self_defence_m > 0.0 { tr { th { "Self-defence within" } td { (format!("{self_defence_m:.0} m")) } } }
+                @if *eye_height_m > 0.0 { tr { th { "Camera over the water" } td { (format!("{eye_height_m:.1} m")) } } }
+                @if !run.details.boats.is_empty() {
+                    tr { th { "Wind" } td { (format!("{:.1} m/s from {from_deg:.0} degrees", east.hypot(*north))) } }
+                }
+            } }
         }
     }
 }
@@ -263,7 +291,7 @@ fn rounds(run: &ReviewedRun, score: &Value) -> Markup {
                         @let found = explained.get(&record.shot);
                         @let (weight, words) = words::round(record, found.map(|(_, round)| *round));
                         @let fired_s = run.seconds(record.fired.ns());
-                        tr data-time=(format!("{fired_s:.3}")) data-shot=(record.shot) {
+                        tr data-time=(fired_s) data-shot=(record.shot) {
                             td.number { (record.shot) }
                             td.number { (format!("{fired_s:.2}")) }
                             td { (badge(&record.outcome, weight)) " " (words) }

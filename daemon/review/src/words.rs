@@ -22,8 +22,12 @@ pub enum Weight {
     Plain,
 }
 
-/// An event in words, with its weight and the boat that it is about; `None` for what the rounds' own table says.
-pub fn event(fact: &ExerciseFact) -> Option<(Weight, String, Option<&str>)> {
+/// An event in words, with its weight and the boat that it is about; `None` for what the rounds' own table says. What would be a success with a
+/// hostile boat is none with one that `is_neutral`.
+pub fn event(
+    fact: &ExerciseFact,
+    is_neutral: impl Fn(&str) -> bool,
+) -> Option<(Weight, String, Option<&str>)> {
     use ExerciseFact as F;
     let at = |range_m: &f64| format!("at {range_m:.0} m");
     let (weight, words, boat) = match fact {
@@ -68,7 +72,9 @@ pub fn event(fact: &ExerciseFact) -> Option<(Weight, String, Option<&str>)> {
             (Weight::Plain, format!("exercise ended, {rounds_left} rounds left"), None)
         }
     };
-    Some((weight, words, boat.map(String::as_str)))
+    let boat = boat.map(String::as_str);
+    let weight = if weight == Weight::Good && boat.is_some_and(is_neutral) { Weight::Alarm } else { weight };
+    Some((weight, words, boat))
 }
 
 /// The outcome of a round in words, and its weight.

@@ -29,6 +29,7 @@ impl Browser {
             .stderr(Stdio::null())
             .spawn();
         let Ok(driver) = driver else {
+            assert!(std::env::var_os("BOWWAVE_BROWSER").is_none(), "chromedriver does not start");
             eprintln!("no chromedriver: the pages are not looked at in a browser; ./check setup installs it");
             return None;
         };

@@ -222,7 +222,7 @@ fn storage(arguments: &DeskArgs, prepared: &PreparedRun, realtime: bool, origin:
             version: env!("CARGO_PKG_VERSION").to_owned(),
             boot_id: bowwave_record::boot_id(),
             started: Some(origin),
-            details: Some(RunDetails::of(&prepared.setup).to_json()),
+            details: Some(RunDetails::of(&prepared.setup, &prepared.models_base).to_json()),
         },
         journal: JournalOptions::default(),
         recording: prepared.record.then(|| RecorderOptions {

@@ -158,7 +158,7 @@ impl Gun<'_> {
                 version: env!("CARGO_PKG_VERSION").to_owned(),
                 boot_id,
                 started: Some(now()),
-                details: Some(RunDetails::of(&settings.setup).to_json()),
+                details: Some(RunDetails::of(&settings.setup, &settings.models_base).to_json()),
             },
             journal: JournalOptions {
                 reserve_bytes: JournalOptions::RESERVE_BYTES,

@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use rusqlite::{Connection, TransactionBehavior};
+use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
 use super::{
     event::{self, NumberedEvent},
@@ -16,6 +16,8 @@ const BATCH: usize = 1024;
 const BLOCKS_HELD: usize = 600;
 /// Most written blocks that are kept in memory for a fresh database.
 const BLOCKS_KEPT: usize = 600;
+
+const NO_ROOM: &str = "tracks of boats are not in the journal from now on: what room there is is for rounds";
 
 /// Rows that wait, and those of this run that were written, for a fresh database.
 #[derive(Debug)]
@@ -73,33 +75,51 @@ impl DebriefRows {
         self.blocks.push_back(block);
     }
 
-    /// Commits what waits, as much as one transaction takes.
+    /// Commits what waits, as much as one transaction takes: events first. Blocks for which there is no room are left out.
     pub(super) fn commit(&mut self, connection: &mut Connection, run: i64) -> rusqlite::Result<()> {
-        let (events, blocks) = (self.events.len().min(BATCH), self.blocks.len().min(BATCH));
-        let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-        for event in self.events.iter().take(events) {
-            event::insert_once(&transaction, run, event)?;
+        let events = self.events.len().min(BATCH);
+        if events > 0 {
+            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+            for event in self.events.iter().take(events) {
+                event::insert_once(&transaction, run, event)?;
+            }
+            transaction.commit()?;
+            self.events_kept.extend(self.events.drain(..events));
+            self.events_kept.drain(..self.events_kept.len().saturating_sub(self.events_kept_max));
         }
+        let done = self.commit_blocks(connection, run);
+        if done.as_ref().is_err_and(|error| error.sqlite_error_code() == Some(ErrorCode::DiskFull)) {
+            self.lost += self.blocks.len() as u64;
+            self.blocks.clear();
+            log::warn!("{NO_ROOM}");
+        }
+        done
+    }
+
+    fn commit_blocks(&mut self, connection: &mut Connection, run: i64) -> rusqlite::Result<()> {
+        let blocks = self.blocks.len().min(BATCH);
+        if blocks == 0 {
+            return Ok(());
+        }
+        let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
         for block in self.blocks.iter().take(blocks) {
             track::insert_once(&transaction, run, block)?;
         }
         transaction.commit()?;
-        self.events_kept.extend(self.events.drain(..events));
-        self.events_kept.drain(..self.events_kept.len().saturating_sub(self.events_kept_max));
         self.blocks_kept.extend(self.blocks.drain(..blocks));
         self.blocks_kept.drain(..self.blocks_kept.len().saturating_sub(BLOCKS_KEPT));
         Ok(())
     }
 
-    /// Inserts what was written and is missing.
+    /// Inserts events that were written and are missing.
     pub(super) fn insert_kept(&self, connection: &Connection, run: i64) -> rusqlite::Result<()> {
-        for event in &self.events_kept {
-            event::insert_once(connection, run, event)?;
-        }
-        for block in &self.blocks_kept {
-            track::insert_once(connection, run, block)?;
-        }
-        Ok(())
+        self.events_kept.iter().try_for_each(|event| event::insert_once(connection, run, event))
+    }
+
+    /// Blocks that were written may be missing: they wait again, after the rounds.
+    pub(super) fn write_blocks_again(&mut self) {
+        self.blocks_kept.append(&mut self.blocks);
+        std::mem::swap(&mut self.blocks, &mut self.blocks_kept);
     }
 
     /// Has the log say what was never written.

@@ -1,5 +1,7 @@
 //! Details of a run for its debrief: what rounds, events and tracks do not say.
 
+use std::path::Path;
+
 use bowwave_core::session::Setup;
 use serde::{Deserialize, Serialize};
 
@@ -11,6 +13,8 @@ pub struct RunDetails {
     pub briefing: Option<String>,
     /// The scenario's boats in the order of the tracks.
     pub boats: Vec<BoatDetails>,
+    /// Folder that models which are files are named from.
+    pub models_base: String,
     /// The weapon's kind, as scenarios call it.
     pub weapon: Option<String>,
     /// Range that hostile boats are to be kept beyond, metres.
@@ -23,8 +27,6 @@ pub struct RunDetails {
     pub wind_m_s: [f64; 2],
     /// The camera.
     pub camera: CameraDetails,
-    /// Size of the screen, pixels.
-    pub screen: [u32; 2],
 }
 
 /// A boat of the scenario.
@@ -58,8 +60,8 @@ pub struct CameraDetails {
 }
 
 impl RunDetails {
-    /// The details of a session.
-    pub fn of(setup: &Setup) -> Self {
+    /// The details of a session whose boats' models lie in `models`, where they are files.
+    pub fn of(setup: &Setup, models: &Path) -> Self {
         let Setup { scenario, calibration, .. } = setup;
         let boats = scenario.boats.iter().zip(&setup.boat_models).map(|(boat, model)| {
             let model = setup.models.get(usize::from(model.0));
@@ -75,28 +77,33 @@ impl RunDetails {
         Self {
             briefing: scenario.exercise.briefing.clone(),
             boats: boats.collect(),
+            models_base: models.canonicalize().unwrap_or_else(|_| models.to_owned()).display().to_string(),
             weapon: scenario.weapon.kind.clone(),
-            keep_off_m: scenario.exercise.goals.keep_off_m,
-            self_defence_m: scenario.exercise.self_defence_m,
-            eye_height_m: scenario.eye_height_m,
-            wind_m_s: scenario.wind.truncate().to_array(),
+            keep_off_m: finite(scenario.exercise.goals.keep_off_m),
+            self_defence_m: finite(scenario.exercise.self_defence_m),
+            eye_height_m: finite(scenario.eye_height_m),
+            wind_m_s: scenario.wind.truncate().to_array().map(finite),
             camera: CameraDetails {
                 size: [lens.width, lens.height],
                 focal: lens.focal.to_array(),
                 centre: lens.centre.to_array(),
                 bore: calibration.bore_in_camera().to_array(),
             },
-            screen: setup.screen.into(),
         }
     }
 
-    /// The details as a journal keeps them. Numbers that are not finite become null.
+    /// The details as a journal keeps them.
     pub fn to_json(&self) -> String {
         serde_json::to_string(self).unwrap_or_default()
     }
 
-    /// The details of a run that a journal has; defaults where it has none, or none that can be read.
-    pub fn from_json(text: Option<&str>) -> Self {
-        text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
+    /// The details that a journal keeps; `None` where they cannot be read.
+    pub fn from_json(text: &str) -> Option<Self> {
+        serde_json::from_str(text).ok()
     }
+}
+
+/// JSON has no numbers that are not finite.
+fn finite(number: f64) -> f64 {
+    if number.is_finite() { number } else { 0.0 }
 }

@@ -19,7 +19,7 @@ ALTER TABLE runs ADD COLUMN details TEXT;
 ";
 /// The version of the tables that has it first.
 pub(super) const VERSION: i64 = 5;
-/// Largest block that is read, bytes: a hundred boats, ten times a second, for a minute.
+/// Largest block that is read, bytes: that of a second has ten kilobytes for a dozen boats.
 const BYTES_MAX: usize = 4 << 20;
 
 /// A block with its number in its run.
@@ -49,7 +49,7 @@ pub(super) fn insert_once(connection: &Connection, run: i64, block: &NumberedBlo
 pub struct StoredTracks {
     /// All that could be read, oldest first.
     pub tracks: TrackBlock,
-    /// Blocks of about a second that are missing between the first and the last, or that cannot be read.
+    /// Blocks of about a second that are missing before the last one, or that cannot be read.
     pub missing: u64,
 }
 
@@ -65,15 +65,15 @@ pub fn read_tracks(path: &Path, runs: RunSelection) -> Result<StoredTracks, Jour
     if version < VERSION || run.is_none() {
         return Ok(stored);
     }
-    let mut next: Option<u64> = None;
+    let mut next = 1;
     let mut read = || -> rusqlite::Result<()> {
         let sql = "SELECT number, block FROM tracks WHERE run = ?1 ORDER BY number";
         let mut statement = connection.prepare(sql)?;
         let mut rows = statement.query([run])?;
         while let Some(row) = rows.next()? {
             let number = row.get::<_, i64>(0)?.cast_unsigned();
-            stored.missing += next.map_or(0, |next| number.saturating_sub(next));
-            next = Some(number.saturating_add(1));
+            stored.missing += number.saturating_sub(next);
+            next = number.saturating_add(1);
             let bytes = row.get_ref(1)?.as_blob().unwrap_or_default();
             match (bytes.len() <= BYTES_MAX).then(|| rmp_serde::from_slice::<TrackBlock>(bytes)) {
                 Some(Ok(block)) => stored.tracks.append(&block),

@@ -10,7 +10,7 @@ use std::{
 };
 
 use bowwave_core::{fault::Fault, world::score::ShotRecord};
-use crossbeam_channel::{Receiver, Sender, TryRecvError, after, never, select};
+use crossbeam_channel::{Receiver, Sender, TryRecvError, after, at, never, select};
 use rusqlite::{Connection, TransactionBehavior};
 
 use super::{
@@ -83,6 +83,8 @@ pub(super) struct JournalWorker {
     reserve: Reserve,
     /// The reserve is not there: the disk is full, or was and has not got room enough yet.
     low: bool,
+    /// When the reserve that was given up is tried again, however much comes meanwhile.
+    refill_at: Instant,
     /// Taken from the queue and not yet committed.
     pending: Arc<Mutex<Pending>>,
     /// The files that `connection` has open, or had.
@@ -137,6 +139,7 @@ impl JournalWorker {
             settings,
             reserve: Reserve::new(path, settings.options.reserve_bytes),
             low: false,
+            refill_at: Instant::now(),
             pending,
             in_doubt: false,
             side_file: None,
@@ -198,7 +201,7 @@ impl JournalWorker {
 
     /// Waits for something to do; `false` at the end.
     fn next(&mut self) -> bool {
-        let tick = if self.low { after(RESERVE_PAUSE) } else { never() };
+        let tick = if self.low { at(self.refill_at) } else { never() };
         select! {
             recv(self.incoming) -> message => match message {
                 Ok(message) => self.take(message),
@@ -335,6 +338,7 @@ impl JournalWorker {
         }
         self.debrief.insert_kept(&transaction, id)?;
         transaction.commit()?;
+        self.debrief.write_blocks_again();
         self.id = id;
         Ok(())
     }
@@ -353,6 +357,7 @@ impl JournalWorker {
             debrief.insert_kept(&transaction, *id)?;
             transaction.commit()
         })?;
+        self.debrief.write_blocks_again();
         self.damage = None;
         self.in_doubt = false;
         let rounds_left_there = self.not_kept;
@@ -417,6 +422,7 @@ impl JournalWorker {
 
     /// Makes the reserve where there is room for it.
     fn refill_reserve(&mut self) {
+        self.refill_at = Instant::now() + RESERVE_PAUSE;
         let made = self.reserve.make();
         if let Err(error) = &made {
             log::debug!("no space kept for the journal {}: {error}", self.path.display());

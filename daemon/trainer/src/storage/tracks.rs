@@ -16,9 +16,10 @@ const BLOCKS_WAITING_MAX: usize = 600;
 pub(super) struct TrackQueue {
     /// The block that is filled now.
     filling: TrackBlock,
-    full: VecDeque<TrackBlock>,
-    /// Blocks that were sent or left out.
-    numbered: u64,
+    /// Blocks with their numbers in the run, which those that are left out have as well.
+    full: VecDeque<(u64, TrackBlock)>,
+    /// Blocks that were closed.
+    closed: u64,
     lost: u64,
 }
 
@@ -32,25 +33,24 @@ impl TrackQueue {
     }
 
     fn close_block(&mut self) {
+        self.closed += 1;
         if self.full.len() < BLOCKS_WAITING_MAX {
-            self.full.push_back(std::mem::take(&mut self.filling));
+            self.full.push_back((self.closed, std::mem::take(&mut self.filling)));
             return;
         }
         if self.lost == 0 {
             log::error!("the journal does not take tracks of boats: the debrief will lack them from now on");
         }
         self.lost += 1;
-        self.numbered += 1;
         self.filling.clear();
     }
 
     /// Hands on what the journal takes; the rest is tried again.
     pub(super) fn send(&mut self, journal: &Journal) {
-        while let Some(block) = self.full.front()
-            && journal.tracks(self.numbered + 1, block.clone()).is_ok()
+        while let Some((number, block)) = self.full.front()
+            && journal.tracks(*number, block.clone()).is_ok()
         {
             self.full.pop_front();
-            self.numbered += 1;
         }
     }
 
@@ -64,7 +64,7 @@ impl TrackQueue {
 
     /// Has the log say what the journal never took.
     pub(super) fn tell_unwritten(&self) {
-        let lost = self.lost + self.full.len() as u64;
+        let lost = self.lost + self.full.len() as u64 + u64::from(!self.filling.is_empty());
         if lost > 0 {
             log::error!(
                 "{lost} blocks of a second of the boats' tracks are not in the journal: the debrief lacks them"
