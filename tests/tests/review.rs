@@ -437,3 +437,66 @@ fn ten_minutes_with_seven_boats_and_300_rounds_stay_small() {
     println!("interactive after {ready_s:.2} s, {scrub_ms:.1} ms for each place that is scrubbed to");
     assert!(browser.errors().is_empty());
 }
+
+/// The places and attitudes that an ACMI file gives the object of that name, with their times.
+fn acmi_places(text: &str, name: &str) -> Vec<(f64, Vec<f64>)> {
+    let (mut time_s, mut id, mut places) = (0.0, None, Vec::new());
+    for line in text.lines() {
+        if let Some(time) = line.strip_prefix('#') {
+            time_s = time.parse().unwrap();
+            continue;
+        }
+        let Some((object, properties)) = line.split_once(",T=") else { continue };
+        let (place, rest) = properties.split_once(',').unwrap_or((properties, ""));
+        if rest.split(',').any(|property| property == format!("Name={name}")) {
+            id = Some(object.to_owned());
+        }
+        if id.as_deref() == Some(object) {
+            places.push((time_s, place.split('|').map(|number| number.parse().unwrap()).collect()));
+        }
+    }
+    places
+}
+
+#[test]
+fn other_programs_get_the_same_places() {
+    let run = reviewed();
+    let folder = run.page.parent().unwrap().to_str().unwrap();
+    let made = |format: &str| {
+        let output = bowwave(["review", folder, "--format", format]);
+        expect_code(&output, 0);
+        fs::read_to_string(String::from_utf8(output.stdout).unwrap().trim()).unwrap()
+    };
+    let tracks = read_tracks(&run.page.with_file_name("hits.sqlite"), RunSelection::Latest).unwrap().tracks;
+    let acmi = made("acmi");
+    assert!(
+        acmi.starts_with("FileType=text/acmi/tacview\nFileVersion=2.2\n0,ReferenceTime=20"),
+        "{acmi:.200}"
+    );
+    let places = acmi_places(&acmi, "passer-by");
+    assert_eq!(places.len(), tracks.samples.len());
+    for (sample, (time_s, place)) in tracks.samples.iter().zip(&places) {
+        let pose = sample.boats[1].unwrap();
+        let at = DVec3::new(place[0] * 111_319.491, place[1] * 110_574.276, place[2]);
+        assert!(at.distance(vector(pose.position)) < 0.01, "{time_s}: {at}");
+        // Attitude put together again: heading clockwise, pitch with the bow up, roll with starboard down.
+        let [roll, pitch, heading] = [place[3], place[4], place[5]].map(f64::to_radians);
+        let turn = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2 - heading)
+            * DQuat::from_rotation_y(-pitch)
+            * DQuat::from_rotation_x(roll);
+        let truth = DQuat::from_array(pose.attitude.map(f64::from)).normalize();
+        assert!(turn.angle_between(truth) < 2e-3, "{time_s}: {turn} {truth}");
+    }
+    assert_eq!(acmi.matches("Type=Projectile+Bullet").count(), tracks.rounds.len());
+    let lines: Vec<Value> = made("jsonl").lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let csv = made("csv");
+    assert_eq!(csv.lines().count(), lines.len() + 1);
+    assert!(csv.starts_with("time_s,kind,name,east_m,north_m,up_m,qx,qy,qz,qw,words\n"), "{csv:.100}");
+    let boats = lines.iter().filter(|line| line["kind"] == "boat" && line["name"] == "hulk <&>");
+    assert_eq!(boats.count(), tracks.samples.len());
+    let rounds: usize = tracks.rounds.iter().map(|path| path.points.len()).sum();
+    assert_eq!(lines.iter().filter(|line| line["kind"] == "round").count(), rounds);
+    let again = bowwave(["review", folder, "--format", "csv", "--out", run.page.to_str().unwrap()]);
+    expect_code(&again, 1);
+    assert!(said(&again).contains("is there already"), "{}", said(&again));
+}

@@ -308,6 +308,19 @@ pub struct ScoreArgs {
     pub json: bool,
 }
 
+/// What `review` makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ReviewFormat {
+    /// A page that needs no other file
+    Html,
+    /// Everything that happened, and where everything was, a row each
+    Csv,
+    /// The same, a JSON object a line
+    Jsonl,
+    /// A flight recording of text (ACMI 2.2), which Tacview opens
+    Acmi,
+}
+
 /// Arguments of `review`.
 #[derive(Debug, Args)]
 pub struct ReviewArgs {
@@ -317,13 +330,16 @@ pub struct ReviewArgs {
     /// This run of the journal; without it the newest
     #[arg(long = "run", value_name = "N")]
     pub number: Option<i64>,
-    /// The page to write (HTML); without it review-N.html beside the journal
+    /// A page for the browser, or rows and tracks for other programs
+    #[arg(long, value_enum, default_value_t = ReviewFormat::Html)]
+    pub format: ReviewFormat,
+    /// The file to write; without it review-N.FORMAT beside the journal
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Replace what is at --out
     #[arg(long, requires = "out")]
     pub force: bool,
-    /// Open the page in the desktop's browser
+    /// Open the file on the desktop: the page in the browser
     #[arg(long)]
     pub open: bool,
 }

@@ -7,7 +7,7 @@ use std::{
 
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
-    text::one_line,
+    text::{one_line, plain_cell},
     time::Time,
     world::{scenario::Side, score::Outcome},
 };
@@ -87,11 +87,10 @@ fn csv(shots: &[StoredShot]) -> Result<Vec<u8>> {
     writer.into_inner().context("cannot write the CSV")
 }
 
-/// A name that a spreadsheet would take for a formula, marked as the text that it is; in one line, whatever it holds.
+/// A cell in one line, whatever it holds; a name that a spreadsheet would take for a formula is marked.
 fn plain(column: &str, cell: &str) -> String {
     let is_text = ["outcome", "boat", "zone", "cause"].contains(&column);
-    let mark = if is_text && cell.starts_with(['=', '+', '-', '@', '\t', '\r']) { "'" } else { "" };
-    format!("{mark}{}", one_line(cell))
+    if is_text { plain_cell(cell) } else { one_line(cell) }
 }
 
 fn table(shots: &[StoredShot], starts: &Starts) -> String {

@@ -1,4 +1,4 @@
-//! `bowwave review`: the debrief of a run as a page.
+//! `bowwave review`: the debrief of a run as a page, and what other programs read of it.
 
 use std::{
     path::{Path, PathBuf},
@@ -6,10 +6,10 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use bowwave_review::{ReviewedRun, page};
+use bowwave_review::{ReviewedRun, export, page};
 
 use crate::{
-    cli::ReviewArgs,
+    cli::{ReviewArgs, ReviewFormat},
     hits::journal_at,
     new_file::{refuse_to_replace, write_new},
     outcome::Outcome,
@@ -23,12 +23,19 @@ pub fn run(arguments: &ReviewArgs) -> Result<Outcome> {
     if let Some(out) = &arguments.out {
         refuse_to_replace(out, arguments.force)?;
     }
-    let path = arguments.out.clone().unwrap_or_else(|| beside(&journal, reviewed.stored.id));
-    write_new(&path, &page(&reviewed))?;
+    let place = || beside(&journal, reviewed.stored.id, arguments.format);
+    let path = arguments.out.clone().unwrap_or_else(place);
+    let text = match arguments.format {
+        ReviewFormat::Html => page(&reviewed),
+        ReviewFormat::Csv => export::csv(&reviewed),
+        ReviewFormat::Jsonl => export::json_lines(&reviewed),
+        ReviewFormat::Acmi => export::acmi(&reviewed),
+    };
+    write_new(&path, &text)?;
     stdout::print(format!("{}\n", path.display()))?;
     if arguments.open {
         open(&path)?;
-    } else {
+    } else if arguments.format == ReviewFormat::Html {
         eprintln!("open it in a browser; it needs no other file and no network");
     }
     // What is missing is said on the page, too.
@@ -36,9 +43,16 @@ pub fn run(arguments: &ReviewArgs) -> Result<Outcome> {
     Ok(if is_whole { Outcome::Done } else { Outcome::Partly })
 }
 
-/// The page's place where none is named: in the journal's folder, one a run.
-fn beside(journal: &Path, run: i64) -> PathBuf {
-    journal.with_file_name(format!("review-{run}.html"))
+/// The file's place where none is named: in the journal's folder, one a run and format.
+fn beside(journal: &Path, run: i64, format: ReviewFormat) -> PathBuf {
+    let end = match format {
+        ReviewFormat::Html => "html",
+        ReviewFormat::Csv => "csv",
+        ReviewFormat::Jsonl => "jsonl",
+        // As Tacview knows its texts.
+        ReviewFormat::Acmi => "txt.acmi",
+    };
+    journal.with_file_name(format!("review-{run}.{end}"))
 }
 
 /// Has the desktop open the page.
@@ -62,7 +76,8 @@ mod tests {
 
     #[test]
     fn each_run_of_a_journal_has_a_page_of_its_own_beside_it() {
-        assert_eq!(beside(Path::new("out/hits.sqlite"), 3), Path::new("out/review-3.html"));
-        assert_eq!(beside(Path::new("hits.sqlite"), 12), Path::new("review-12.html"));
+        let of = |journal, run, format| beside(Path::new(journal), run, format);
+        assert_eq!(of("out/hits.sqlite", 3, ReviewFormat::Html), Path::new("out/review-3.html"));
+        assert_eq!(of("hits.sqlite", 12, ReviewFormat::Acmi), Path::new("review-12.txt.acmi"));
     }
 }

@@ -25,6 +25,12 @@ pub fn one_line(message: &str) -> String {
     line
 }
 
+/// A text as a cell of a table for spreadsheets: in one line, and marked as the text that it is where it would be taken for a formula.
+pub fn plain_cell(text: &str) -> String {
+    let mark = if text.starts_with(['=', '+', '-', '@', '\t', '\r']) { "'" } else { "" };
+    format!("{mark}{}", one_line(text))
+}
+
 /// Tests for a control of the direction of writing (bidirectional control, Unicode UAX 9).
 const fn turns_direction(c: char) -> bool {
     matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
