@@ -308,7 +308,7 @@ pub struct ScoreArgs {
     pub json: bool,
 }
 
-/// What `review` makes.
+/// Formats of `review`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ReviewFormat {
     /// A page that needs no other file

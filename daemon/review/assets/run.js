@@ -39,9 +39,13 @@ function countUpTo(list, value) {
 /** The cubic through b and c with the slopes of its neighbours (Catmull and Rom 1974).
  * @param {number} a @param {number} b @param {number} c @param {number} d @param {number} s */
 function cubic(a, b, c, d, s) {
-  const from = (c - a) / 2;
-  const to = (d - b) / 2;
-  return b + s * (from + s * (3 * (c - b) - 2 * from - to + s * (2 * (b - c) + from + to)));
+  return hermite(b, (c - a) / 2, c, (d - b) / 2, s);
+}
+
+/** The cubic from a to b by their slopes over the span (Hermite).
+ * @param {number} a @param {number} from @param {number} b @param {number} to @param {number} s */
+function hermite(a, from, b, to, s) {
+  return a + s * (from + s * (3 * (b - a) - 2 * from - to + s * (2 * (a - b) + from + to)));
 }
 
 /** @param {Float32Array} q @param {number} a @param {number} b @param {number} s @returns {number[]} */
@@ -89,11 +93,7 @@ class Round {
     const p = this.points;
     const span = p[b] - p[a];
     const s = span > 0 ? Math.min(Math.max((after - p[a]) / span, 0), 1) : 0;
-    return [1, 2, 3].map((k) => {
-      const [from, to] = [p[a + k + 3] * span, p[b + k + 3] * span];
-      const [c, d] = [p[a + k], p[b + k]];
-      return c + s * (from + s * (3 * (d - c) - 2 * from - to + s * (2 * (c - d) + from + to)));
-    });
+    return [1, 2, 3].map((k) => hermite(p[a + k], p[a + k + 3] * span, p[b + k], p[b + k + 3] * span, s));
   }
 }
 

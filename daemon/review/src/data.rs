@@ -2,8 +2,11 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use bowwave_core::world::track::{RoundPath, TrackPose, TrackSample};
-use bowwave_record::{CameraDetails, RunDetails};
+use bowwave_core::{
+    side::Side,
+    world::track::{RoundPath, TrackPose, TrackSample},
+};
+use bowwave_record::{BoatDetails, CameraDetails, RunDetails};
 use serde::Serialize;
 
 use crate::{
@@ -16,7 +19,7 @@ use crate::{
 #[derive(Debug, Serialize)]
 pub struct PageData<'a> {
     end_s: f64,
-    boats: Vec<PageBoat<'a>>,
+    boats: &'a [BoatDetails],
     camera: CameraDetails,
     keep_off_m: f64,
     eye_height_m: f64,
@@ -24,15 +27,6 @@ pub struct PageData<'a> {
     rounds: Vec<PageRound>,
     events: Vec<PageEvent>,
     meshes: BTreeMap<&'a str, Mesh>,
-}
-
-#[derive(Debug, Serialize)]
-struct PageBoat<'a> {
-    name: &'a str,
-    side: &'a str,
-    model: &'a str,
-    low_m: [f32; 3],
-    high_m: [f32; 3],
 }
 
 /// Samples: arrays in base64 of little-endian numbers. NaN where there is none.
@@ -75,13 +69,7 @@ pub fn of(run: &ReviewedRun) -> (PageData<'_>, Vec<String>) {
     let (meshes, notes) = meshes::of_boats(boats, Path::new(&run.details.models_base));
     let data = PageData {
         end_s: run.seconds(run.end_ns()),
-        boats: boats
-            .iter()
-            .map(|b| {
-                let (low_m, high_m) = (b.low_m, b.high_m);
-                PageBoat { name: &b.name, side: &b.side, model: &b.model, low_m, high_m }
-            })
-            .collect(),
+        boats,
         camera: *camera,
         keep_off_m: *keep_off_m,
         eye_height_m: *eye_height_m,
@@ -113,10 +101,9 @@ fn numbers(pose: Option<TrackPose>) -> [f32; 7] {
 fn rounds(run: &ReviewedRun) -> Vec<PageRound> {
     let paths: BTreeMap<u64, &RoundPath> =
         run.tracks.tracks.rounds.iter().map(|path| (path.shot, path)).collect();
-    let explained: BTreeMap<u64, _> = run.scored.explained.iter().map(|round| (round.shot, round)).collect();
     let of_shot = |stored: &bowwave_record::StoredShot| {
         let record = &stored.record;
-        let explained = explained.get(&record.shot).copied();
+        let explained = run.scored.explanation(record.shot).map(|(_, round)| round);
         let (weight, words) = words::round(record, explained);
         let point = |p: &bowwave_core::world::track::PathPoint| {
             let ([x, y, z], [u, v, w]) = (p.position, p.velocity);
@@ -139,14 +126,12 @@ fn rounds(run: &ReviewedRun) -> Vec<PageRound> {
 
 fn events(run: &ReviewedRun) -> Vec<PageEvent> {
     let of_event = |event: &bowwave_core::world::exercise::ExerciseEvent| {
-        let is_neutral = |name: &str| run.boat(name).is_some_and(|i| run.details.boats[i].side == "neutral");
-        let (weight, words, boat) = words::event(&event.fact, is_neutral)?;
-        Some(PageEvent {
-            time_s: run.seconds(event.time.ns()),
-            weight,
-            words,
-            boat: boat.and_then(|name| run.boat(name)),
-        })
+        let (weight, words, boat) = words::event(&event.fact)?;
+        let boat = boat.and_then(|name| run.boat(name));
+        // Success with a hostile boat is none with a neutral one.
+        let is_neutral = boat.is_some_and(|i| run.details.boats[i].side == Side::Neutral.name());
+        let weight = if weight == Weight::Good && is_neutral { Weight::Alarm } else { weight };
+        Some(PageEvent { time_s: run.seconds(event.time.ns()), weight, words, boat })
     };
     run.scored.events.iter().filter_map(of_event).collect()
 }

@@ -17,7 +17,7 @@ pub struct ReviewedRun {
     pub details: RunDetails,
     /// The journal has details, but not such as this version can read.
     pub has_unreadable_details: bool,
-    /// Where boats, rounds and gun were.
+    /// Tracks of boats, rounds and gun.
     pub tracks: StoredTracks,
     /// Score, rounds and events.
     pub scored: ScoredRun,

@@ -72,6 +72,14 @@ impl ScoredRun {
     }
 }
 
+impl ScoredRun {
+    /// The explanation of a round that missed, with its index in [`Self::explained`].
+    pub fn explanation(&self, shot: u64) -> Option<(usize, &ExplainedRound)> {
+        let at = self.explained.binary_search_by_key(&shot, |round| round.shot).ok()?;
+        Some((at, &self.explained[at]))
+    }
+}
+
 fn explained_round(event: &ExerciseEvent) -> Option<ExplainedRound> {
     let ExerciseFact::Missed { shot, boat, why } = &event.fact else { return None };
     Some(ExplainedRound {

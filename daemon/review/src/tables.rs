@@ -1,7 +1,5 @@
 //! The tables of the page. Each number of the score is in a cell that names its place in the score's JSON.
 
-use std::collections::BTreeMap;
-
 use bowwave_core::{text::one_line, world::score::Outcome};
 use bowwave_record::RunDetails;
 use maud::{Markup, html};
@@ -273,8 +271,6 @@ fn group(run: &ReviewedRun) -> Markup {
 }
 
 fn rounds(run: &ReviewedRun, score: &Value) -> Markup {
-    let explained: BTreeMap<u64, (usize, _)> =
-        run.scored.explained.iter().enumerate().map(|(i, round)| (round.shot, (i, round))).collect();
     let cells = Cells { score };
     html! {
         section.panel.wide {
@@ -288,8 +284,8 @@ fn rounds(run: &ReviewedRun, score: &Value) -> Markup {
                 tbody id="rounds" {
                     @for stored in &run.scored.shots {
                         @let record = &stored.record;
-                        @let found = explained.get(&record.shot);
-                        @let (weight, words) = words::round(record, found.map(|(_, round)| *round));
+                        @let found = run.scored.explanation(record.shot);
+                        @let (weight, words) = words::round(record, found.map(|(_, round)| round));
                         @let fired_s = run.seconds(record.fired.ns());
                         tr data-time=(fired_s) data-shot=(record.shot) {
                             td.number { (record.shot) }

@@ -1,6 +1,7 @@
 //! Events and outcomes of rounds in plain words.
 
 use bowwave_core::{
+    side::Side,
     text::one_line,
     world::{
         exercise::ExerciseFact,
@@ -22,12 +23,8 @@ pub enum Weight {
     Plain,
 }
 
-/// An event in words, with its weight and the boat that it is about; `None` for what the rounds' own table says. What would be a success with a
-/// hostile boat is none with one that `is_neutral`.
-pub fn event(
-    fact: &ExerciseFact,
-    is_neutral: impl Fn(&str) -> bool,
-) -> Option<(Weight, String, Option<&str>)> {
+/// An event in words, with its weight for a hostile boat and the boat that it is about; `None` for what the rounds' own table says.
+pub fn event(fact: &ExerciseFact) -> Option<(Weight, String, Option<&str>)> {
     use ExerciseFact as F;
     let at = |range_m: &f64| format!("at {range_m:.0} m");
     let (weight, words, boat) = match fact {
@@ -64,7 +61,7 @@ pub fn event(
         F::Stoppage => (Weight::Plain, "weapon stopped".to_owned(), None),
         F::BarrelHot => (Weight::Plain, "barrel hot: rounds scatter".to_owned(), None),
         F::Fragments { shot, boat, side } => {
-            let weight = if side.name() == "neutral" { Weight::Alarm } else { Weight::Plain };
+            let weight = if *side == Side::Neutral { Weight::Alarm } else { Weight::Plain };
             (weight, format!("crew struck by fragments of round {shot}"), Some(boat))
         }
         F::Message { text } => (Weight::Plain, format!("message: {}", one_line(text)), None),
@@ -72,16 +69,14 @@ pub fn event(
             (Weight::Plain, format!("exercise ended, {rounds_left} rounds left"), None)
         }
     };
-    let boat = boat.map(String::as_str);
-    let weight = if weight == Weight::Good && boat.is_some_and(is_neutral) { Weight::Alarm } else { weight };
-    Some((weight, words, boat))
+    Some((weight, words, boat.map(String::as_str)))
 }
 
 /// The outcome of a round in words, and its weight.
 pub fn round(record: &ShotRecord, explained: Option<&ExplainedRound>) -> (Weight, String) {
     match (&record.outcome, explained) {
         (Outcome::Hit { boat, side, zone, range_m, .. }, _) => {
-            let is_neutral = side.is_some_and(|side| side.name() == "neutral");
+            let is_neutral = *side == Some(Side::Neutral);
             let weight = if is_neutral { Weight::Alarm } else { Weight::Good };
             let whose = if is_neutral { ", a neutral boat" } else { "" };
             (weight, format!("struck the {} of {}{whose}, at {range_m:.0} m", zone.name(), one_line(boat)))

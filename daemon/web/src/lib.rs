@@ -1,4 +1,4 @@
-//! What the trainer's pages share: one look, vendored browser libraries, and pages that need no other file.
+//! Parts that the trainer's pages share: one look, vendored browser libraries, and pages that need no other file.
 
 #![forbid(unsafe_code)]
 

@@ -116,12 +116,12 @@ pub struct TrackBlock {
 }
 
 impl TrackBlock {
-    /// Whether it holds nothing.
+    /// Tests whether it holds nothing.
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty() && self.rounds.is_empty()
     }
 
-    /// Moves all of `other` behind what this holds.
+    /// Adds all of `other` behind what this holds.
     pub fn append(&mut self, other: &Self) {
         self.samples.extend_from_slice(&other.samples);
         self.rounds.extend_from_slice(&other.rounds);

@@ -40,7 +40,7 @@ impl DebriefRows {
         Self { events, events_kept, blocks, blocks_kept, lost: 0, events_held_max, events_kept_max }
     }
 
-    /// Whether nothing waits.
+    /// Tests whether nothing waits.
     pub(super) fn is_empty(&self) -> bool {
         self.events.is_empty() && self.blocks.is_empty()
     }

@@ -89,7 +89,7 @@ fn frames(run: &ReviewedRun) -> BTreeMap<i64, Vec<String>> {
     }
     run.tracks.tracks.rounds.iter().for_each(|path| round(path, &mut put));
     for event in &run.scored.events {
-        if let Some((_, words, boat)) = words::event(&event.fact, |_| false) {
+        if let Some((_, words, boat)) = words::event(&event.fact) {
             let about = boat.map_or_else(String::new, |name| format!("{} ", one_line(name)));
             put(
                 event.time.ns(),

@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::{run::ReviewedRun, words};
 
 /// A row. Times are seconds from the run's beginning; places are metres from the gun's foot: east, north, up.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 struct Row<'a> {
     time_s: f64,
     /// `boat`, `camera`, `round`, `event` or `outcome`.
@@ -53,13 +53,13 @@ pub fn json_lines(run: &ReviewedRun) -> String {
 /// Hands over all rows: what happened, then tracks of boats and gun, then paths of rounds.
 fn each(run: &ReviewedRun, put: &mut impl FnMut(&Row<'_>)) {
     for event in &run.scored.events {
-        if let Some((_, words, boat)) = words::event(&event.fact, |_| false) {
+        if let Some((_, words, boat)) = words::event(&event.fact) {
             put(&said(run.seconds(event.time.ns()), "event", boat.unwrap_or_default().to_owned(), &words));
         }
     }
     for stored in &run.scored.shots {
-        let explained = run.scored.explained.iter().find(|round| round.shot == stored.record.shot);
-        let (_, words) = words::round(&stored.record, explained);
+        let explained = run.scored.explanation(stored.record.shot);
+        let (_, words) = words::round(&stored.record, explained.map(|(_, round)| round));
         put(&said(run.seconds(stored.record.fired.ns()), "outcome", stored.record.shot.to_string(), &words));
     }
     for sample in &run.tracks.tracks.samples {
@@ -77,30 +77,22 @@ fn each(run: &ReviewedRun, put: &mut impl FnMut(&Row<'_>)) {
 }
 
 fn said<'a>(time_s: f64, kind: &'static str, name: String, words: &'a str) -> Row<'a> {
-    Row { words: Some(words), ..bare(time_s, kind, name) }
+    Row { time_s, kind, name, words: Some(words), ..Row::default() }
 }
 
-fn bare<'a>(time_s: f64, kind: &'static str, name: String) -> Row<'a> {
-    let (east_m, north_m, up_m) = (None, None, None);
-    Row { time_s, kind, name, east_m, north_m, up_m, qx: None, qy: None, qz: None, qw: None, words: None }
+/// A row of a body at a place.
+fn at<'a>(time_s: f64, kind: &'static str, name: String, [x, y, z]: [f32; 3]) -> Row<'a> {
+    Row { time_s, kind, name, east_m: Some(x), north_m: Some(y), up_m: Some(z), ..Row::default() }
 }
 
 fn placed<'a>(time_s: f64, kind: &'static str, name: String, pose: TrackPose) -> Row<'a> {
-    let ([x, y, z], [i, j, k, w]) = (pose.position, pose.attitude);
-    Row {
-        qx: Some(i),
-        qy: Some(j),
-        qz: Some(k),
-        qw: Some(w),
-        ..Row { east_m: Some(x), north_m: Some(y), up_m: Some(z), ..bare(time_s, kind, name) }
-    }
+    let [i, j, k, w] = pose.attitude;
+    Row { qx: Some(i), qy: Some(j), qz: Some(k), qw: Some(w), ..at(time_s, kind, name, pose.position) }
 }
 
 fn round(run: &ReviewedRun, path: &RoundPath, put: &mut impl FnMut(&Row<'_>)) {
     for point in &path.points {
         let time_s = run.seconds(path.fired_ns) + f64::from(point.after_s);
-        let [x, y, z] = point.position;
-        let row = bare(time_s, "round", path.shot.to_string());
-        put(&Row { east_m: Some(x), north_m: Some(y), up_m: Some(z), ..row });
+        put(&at(time_s, "round", path.shot.to_string(), point.position));
     }
 }
