@@ -226,7 +226,8 @@ impl Capture {
             | Event::Ship(_)
             | Event::ShipFix(_)
             | Event::Mark(_)
-            | Event::Act(_) => {}
+            | Event::Act(_)
+            | Event::Order(_) => {}
         }
     }
 

@@ -8,6 +8,7 @@ use crate::{
     act::TraineeAct,
     ephemeris::{Place, Utc},
     fault::FaultChange,
+    order::InstructorOrder,
     time::Time,
 };
 
@@ -53,6 +54,8 @@ pub enum Event {
     Mark(Mark),
     /// The trainee did something besides pulling the trigger, or an instructor marked a call.
     Act(TraineeAct),
+    /// An instructor ordered something.
+    Order(InstructorOrder),
     /// A fault came or went.
     Fault(FaultChange),
 }
@@ -68,6 +71,7 @@ impl Event {
             Self::ShipFix(f) => f.arrival,
             Self::Mark(m) => m.time,
             Self::Act(a) => a.time,
+            Self::Order(o) => o.time,
             Self::Fault(f) => f.time,
         }
     }

@@ -67,6 +67,9 @@ pub enum OrderError {
         /// Bytes that it has.
         bytes: usize,
     },
+    /// A text for the LCD has letters that it does not have.
+    #[error("the LCD shows letters without accents only (ASCII): write the text with these")]
+    NoAscii,
     /// A place is no number, or out of reach.
     #[error(
         "bearing {bearing_deg} deg, range {range_m} m is no place: give a bearing of 0 to 360 and a range of 50 to 20000"
@@ -86,6 +89,8 @@ impl Order {
     /// Where a text or a place is none.
     pub fn check(&self) -> Result<(), OrderError> {
         match self {
+            // The LCD's letters are those of ASCII.
+            Self::Message { text } if !text.is_ascii() => Err(OrderError::NoAscii),
             Self::Message { text } => plain(text, MESSAGE_BYTES_MAX),
             Self::Note { text } => plain(text, NOTE_BYTES_MAX),
             Self::Join { boat, at } => {
@@ -133,6 +138,7 @@ mod tests {
     fn orders_that_are_none_are_refused_in_words() {
         let message = |text: &str| Order::Message { text: text.to_owned() }.check();
         assert_eq!(message("CEASE FIRE, REPORT"), Ok(()));
+        assert_eq!(message("GRÜSSE"), Err(OrderError::NoAscii));
         assert!(message(" ").is_err() && message("two\nlines").is_err());
         assert!(message(&"x".repeat(MESSAGE_BYTES_MAX + 1)).unwrap_err().to_string().contains("121 bytes"));
         let join = |bearing_deg, range_m| {

@@ -195,6 +195,7 @@ impl Session {
             }
             Event::Mark(mark) => self.estimator.mark(mark),
             Event::Act(act) => self.world.act(*act),
+            Event::Order(order) => self.world.order(order),
             Event::Fault(change) => {
                 // The line for the log is the caller's affair: this board only knows what is there.
                 let _ = self.faults.take(change);
@@ -223,6 +224,7 @@ impl Session {
         let moment = FrameMoment {
             video_time,
             permission,
+            is_paused: self.world.clock().is_paused(),
             warning: self.warning_shown(),
             checks: self.estimator.checks(tick.time),
             water: self.water_drawn(),

@@ -26,6 +26,8 @@ use glam::{DQuat, DVec2, DVec3, Vec2, Vec3};
 
 #[path = "session/lights.rs"]
 mod lights;
+#[path = "session/orders.rs"]
+mod orders;
 
 const MS: i64 = 1_000_000;
 

@@ -59,6 +59,11 @@ pub fn event(fact: &ExerciseFact) -> Option<(Weight, String, Option<&str>)> {
         F::TurnedAway { boat, range_m } => (Weight::Good, format!("turned away {}", at(range_m)), Some(boat)),
         F::CameBack { boat } => (Weight::Plain, "came on again".to_owned(), Some(boat)),
         F::Stoppage => (Weight::Plain, "weapon stopped".to_owned(), None),
+        F::StoppageOrdered => (Weight::Plain, "instructor: stoppage with the next round".to_owned(), None),
+        F::Paused => (Weight::Plain, "instructor: exercise stands still".to_owned(), None),
+        F::Resumed => (Weight::Plain, "instructor: exercise goes on".to_owned(), None),
+        F::Joined { boat, range_m, .. } => (Weight::Plain, format!("joined {}", at(range_m)), Some(boat)),
+        F::Note { text } => (Weight::Plain, format!("instructor's note: {}", one_line(text)), None),
         F::BarrelHot => (Weight::Plain, "barrel hot: rounds scatter".to_owned(), None),
         F::Fragments { shot, boat, side } => {
             let weight = if *side == Side::Neutral { Weight::Alarm } else { Weight::Plain };

@@ -202,6 +202,10 @@ fn next(
                 digest.take(&(since(act.time), act.act));
                 "act"
             }
+            Entry::Order(order) => {
+                digest.take(&(since(order.time), &order.order));
+                "order"
+            }
             Entry::ShipValues(sample) => {
                 digest.take(&ShipSample { arrival: Time::from_ns(since(sample.arrival)), ..*sample });
                 "sample of the ship"

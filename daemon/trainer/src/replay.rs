@@ -150,6 +150,7 @@ fn input_of(entry: Entry, decoder: &mut Decoder, path: &Path) -> Result<Option<R
         Entry::Trigger(edge) => Event::Trigger(edge),
         Entry::Mark(mark) => Event::Mark(mark),
         Entry::Act(act) => Event::Act(act),
+        Entry::Order(order) => Event::Order(order),
         Entry::ShipValues(sample) => Event::Ship(sample),
         Entry::ShipFix(fix) => Event::ShipFix(fix),
         Entry::Fault(entry) => Event::Fault(entry.change),

@@ -146,6 +146,7 @@ impl Producer {
             }
             Item::Mark(mark) => ready.push(Ok(Event::Mark(mark))),
             Item::Act(act) => ready.push(Ok(Event::Act(act))),
+            Item::Order(order) => ready.push(Ok(Event::Order(order))),
             Item::Trigger(edge) => {
                 self.triggers += 1;
                 ready.push(Ok(Event::Trigger(edge)));

@@ -187,6 +187,7 @@ impl Laps {
             Entry::Ship(line) => line.arrival = line.arrival.plus_ns(shift),
             Entry::Mark(mark) => mark.time = mark.time.plus_ns(shift),
             Entry::Act(act) => act.time = act.time.plus_ns(shift),
+            Entry::Order(order) => order.time = order.time.plus_ns(shift),
             Entry::Truth(pose) => {
                 pose.time = pose.time.plus_ns(shift);
                 if self.lap == 0 {

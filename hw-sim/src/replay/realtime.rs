@@ -9,6 +9,7 @@ use std::{
 use bowwave_core::{
     act::TraineeAct,
     event::{CameraFrame, Event, Mark, TriggerEdge},
+    order::InstructorOrder,
     time::Time,
 };
 use bowwave_devices::{
@@ -211,6 +212,7 @@ enum Due {
     Trigger(TriggerEdge),
     Mark(Mark),
     Act(TraineeAct),
+    Order(InstructorOrder),
 }
 
 impl Reader {
@@ -224,6 +226,7 @@ impl Reader {
                 Ok(Item::Trigger(edge)) => self.due.send(Due::Trigger(edge)).is_ok(),
                 Ok(Item::Mark(mark)) => self.due.send(Due::Mark(mark)).is_ok(),
                 Ok(Item::Act(act)) => self.due.send(Due::Act(act)).is_ok(),
+                Ok(Item::Order(order)) => self.due.send(Due::Order(order)).is_ok(),
                 Err(error) => {
                     // Room for one from each sender; where it is full something else has been reported.
                     drop(self.errors.try_send(error.into()));
@@ -261,6 +264,7 @@ impl Line {
                 Due::Trigger(edge) => edge.time,
                 Due::Mark(mark) => mark.time,
                 Due::Act(act) => act.time,
+                Due::Order(order) => order.time,
             };
             if !self.pace.wait(time) {
                 return self.terminals;
@@ -283,6 +287,10 @@ impl Line {
                 }
                 Due::Act(act) => {
                     self.triggers.send(Event::Act(act));
+                    Ok(0)
+                }
+                Due::Order(order) => {
+                    self.triggers.send(Event::Order(order));
                     Ok(0)
                 }
             };

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use bowwave_core::{
     act::TraineeAct,
     event::{ImuSample, Mark, TriggerEdge},
+    order::InstructorOrder,
     time::Time,
 };
 use bowwave_devices::vectornav::CommonOutput;
@@ -36,6 +37,7 @@ pub(super) enum Item {
     /// The operator's press.
     Mark(Mark),
     Act(TraineeAct),
+    Order(InstructorOrder),
 }
 
 /// A picture as it is recorded.
@@ -137,6 +139,7 @@ impl Iterator for Wire {
                 }
                 Ok(Entry::Mark(mark)) => Some(Item::Mark(mark)),
                 Ok(Entry::Act(act)) => Some(Item::Act(act)),
+                Ok(Entry::Order(order)) => Some(Item::Order(order)),
                 Ok(Entry::Picture(picture)) => Some(Item::Frame(RecordedPicture::Raw(picture))),
                 // Comes over no wire: known afterwards, or of the run that was recorded.
                 Ok(

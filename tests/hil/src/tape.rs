@@ -141,6 +141,7 @@ impl Tape {
                 | Entry::ShipFix(_)
                 | Entry::Mark(_)
                 | Entry::Act(_)
+                | Entry::Order(_)
                 | Entry::Picture(_)
                 | Entry::Fault(_)
                 | Entry::Tick(_) => {}

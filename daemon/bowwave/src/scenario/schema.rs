@@ -422,6 +422,7 @@ fn boat() -> Value {
                 ),
             ),
             ("burns_at_s", number(0.0, 86_400.0, "On fire from then on, without being hit")),
+            ("reserve", flag("Whether it waits until an instructor has it join")),
             ("count", whole(1, 40, "Boats of the group")),
             ("axes_deg", axes()),
             ("on_target_s", number(1.0, 86_400.0, "When they are to be where they attack from")),

@@ -70,6 +70,8 @@ pub struct FrameMoment {
     pub video_time: Option<Time>,
     /// Whether the weapon may fire.
     pub permission: FirePermission,
+    /// The exercise stands still.
+    pub is_paused: bool,
     /// The fault that the sailor should know of though training goes on.
     pub warning: Option<Fault>,
     /// Confirmation of the orientation by the pictures.
@@ -239,6 +241,8 @@ impl Composer {
                 wakes: self.plan.has(Pass::Wake),
                 water_within_m: f64::INFINITY,
             };
+            // Boats and rounds lie in the exercise's time, camera and light in the picture's.
+            let time = world.clock().of_host(time);
             scene.time_s = time.secs_since(running.start);
             let frustum = ViewFrustum {
                 water_within_m: match moment.water {
@@ -278,6 +282,7 @@ impl Composer {
             lights: &scene.lights,
             rounds: &scene.rounds,
         });
+        let time = world.clock().of_host(time);
         let result = world.last_result().filter(|result| time.secs_since(result.time) < RESULT_S);
         let score = world.score();
         scene.hud = Hud {
@@ -398,7 +403,7 @@ fn unchecked(checks: &RegistrationChecks) -> Option<&'static str> {
     unseen.map(|(_, cause)| *cause).or((!checks.is_tried).then_some("TURN AND TILT THE GUN"))
 }
 
-/// The status: the fault that keeps the weapon from scoring, else the newest result, else whether what is drawn has been confirmed.
+/// The status: the fault that keeps the weapon from scoring, else that the exercise stands still, else the newest result, else whether what is drawn has been confirmed.
 fn status(moment: &FrameMoment, result: Option<LastResult>) -> Status {
     match moment.permission {
         FirePermission::Safe(f) => Status::Fault { cause: f.cause(), action: f.action() },
@@ -406,6 +411,7 @@ fn status(moment: &FrameMoment, result: Option<LastResult>) -> Status {
             let fault = NotScored::fault(why);
             Status::NotScored { cause: fault.cause(), action: fault.action() }
         }
+        FirePermission::Armed if moment.is_paused => Status::Paused,
         FirePermission::Armed => match result {
             Some(LastResult { struck: Some((Side::Hostile, zone)), .. }) => Status::Hit { zone },
             Some(LastResult { struck: Some((Side::Neutral, zone)), .. }) => Status::NeutralHit { zone },

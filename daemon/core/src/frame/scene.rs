@@ -383,6 +383,8 @@ pub enum Status {
         /// For how long, upper case.
         cause: &'static str,
     },
+    /// An instructor has the exercise stand still: nothing is fired.
+    Paused,
     /// Rounds fired now are not scored.
     NotScored {
         /// Short cause, upper case.

@@ -10,6 +10,7 @@ use crate::{
     act::DriveOrder,
     geometry::RigidPose,
     model::{Model, ModelId},
+    order::JoinPlace,
     time::Time,
     world::{
         boats::{
@@ -17,8 +18,9 @@ use crate::{
             Orders, RoundStrike, Signals, StepView, Traffic, step_after, step_seconds,
         },
         contact::Capsule,
+        exercise::group_of,
         flare::Flare,
-        scenario::{BoatSpec, Scenario, Side},
+        scenario::{BoatSpec, Scenario, Side, place},
         searchlight::{Beam, Searchlight},
         seeing::{SceneLight, Seeing, SeeingLog},
         waves::{WaterLevel, WaveField},
@@ -40,6 +42,8 @@ pub struct Vessel {
     pub lights: LightsKept,
     /// When it is on fire by itself, seconds after the beginning; `None` for one that only rounds set on fire.
     pub burns_at_s: Option<f64>,
+    /// It waits until it is to join.
+    pub in_reserve: bool,
 }
 
 impl Vessel {
@@ -52,6 +56,7 @@ impl Vessel {
             behaviour: boat.behaviour.clone().in_session(scenario.seed),
             lights: boat.lights,
             burns_at_s: boat.burns_at_s,
+            in_reserve: boat.in_reserve,
         };
         scenario.boats.iter().zip(boat_models).map(vessel).collect()
     }
@@ -84,9 +89,15 @@ struct FleetBoat {
     rigged: Option<LightsRigged>,
     /// Seconds since the start at which it was warned.
     warned_s: Option<f64>,
+    /// Its behaviour once it joins; `None` for a boat that is there.
+    waiting: Option<Behaviour>,
 }
 
 impl FleetBoat {
+    fn is_here(&self) -> bool {
+        self.waiting.is_none()
+    }
+
     fn traffic(&self, time_s: f64) -> Traffic {
         let state = self.history.state(time_s);
         let radius_m = 0.5 * self.history.hull().length_m;
@@ -154,13 +165,14 @@ impl Fleet {
     /// Boats that begin at `start`. Each vessel's model must be in `models`.
     pub fn new(vessels: Vec<Vessel>, models: Arc<[Model]>, waves: WaveField, start: Time) -> Self {
         let boat = |vessel: Vessel| {
-            let Vessel { name, side, model: id, behaviour, lights, burns_at_s } = vessel;
+            let Vessel { name, side, model: id, behaviour, lights, burns_at_s, in_reserve } = vessel;
             let model = models.get(usize::from(id.0));
             let hull = model.map_or(Hull { length_m: 1.0, beam_m: 1.0 }, Hull::of);
             let form = model.map_or_else(|| HullForm::new((-0.5, 0.5), 0.3, 1.2, |_| 0.5), HullForm::of);
+            let waiting = in_reserve.then(|| behaviour.clone());
             let history = BoatHistory::new(behaviour, hull, form);
             let rigged = model.filter(|_| lights != LightsKept::None).map(LightsRigged::on);
-            FleetBoat { name, side, model: id, history, lights, burns_at_s, rigged, warned_s: None }
+            FleetBoat { name, side, model: id, history, lights, burns_at_s, rigged, warned_s: None, waiting }
         };
         let boats = vessels.into_iter().map(boat).collect();
         let (struck, driven) = (Vec::new(), Vec::new());
@@ -234,19 +246,41 @@ impl Fleet {
         self.followed = self.followed.max(time);
         let until_s = self.followed.secs_since(self.start);
         // A scripted boat knows nothing of others and can go ahead.
-        for boat in self.boats.iter_mut().filter(|b| !b.history.is_crewed()) {
+        for boat in self.boats.iter_mut().filter(|b| b.is_here() && !b.history.is_crewed()) {
             boat.history.follow(until_s, &self.waves);
         }
         self.step_crews(until_s);
-        for boat in self.boats.iter_mut().filter(|b| b.history.is_crewed()) {
+        for boat in self.boats.iter_mut().filter(|b| b.is_here() && b.history.is_crewed()) {
             boat.history.follow(until_s, &self.waves);
         }
+    }
+
+    /// A boat of the reserve joins at `time`, or all of the group of that name; at that place instead of the scenario's where one is given. Boats have
+    /// not been followed that far. Gives those that joined.
+    pub fn join(&mut self, name: &str, at: Option<JoinPlace>, time: Time) -> Vec<usize> {
+        let seconds = time.secs_since(self.start);
+        let is_meant = |b: &FleetBoat| b.waiting.is_some() && (b.name == name || group_of(&b.name) == name);
+        let joining: Vec<usize> = (0..self.boats.len()).filter(|i| is_meant(&self.boats[*i])).collect();
+        let starts = joining.iter().filter_map(|i| self.boats[*i].waiting.as_ref());
+        let middle = starts.map(|b| b.begin().position).sum::<DVec2>() / joining.len().max(1) as f64;
+        for i in &joining {
+            let boat = &mut self.boats[*i];
+            let Some(behaviour) = boat.waiting.take() else { continue };
+            let to = at.map_or(middle, |at| place(at.bearing_deg.to_radians(), at.range_m));
+            boat.history.restart(behaviour.moved(middle, to).begun_at(seconds));
+        }
+        joining
+    }
+
+    /// Tests whether a boat waits in reserve.
+    pub fn in_reserve(&self, boat: usize) -> bool {
+        self.boats.get(boat).is_some_and(|b| !b.is_here())
     }
 
     /// Steps all crewed boats together, so that each sees the others as they are.
     fn step_crews(&mut self, until_s: f64) {
         let last = step_after(until_s);
-        let newest = |b: &FleetBoat| b.history.is_crewed().then(|| b.history.newest());
+        let newest = |b: &FleetBoat| (b.is_here() && b.history.is_crewed()).then(|| b.history.newest());
         let Some(first) = self.boats.iter().filter_map(newest).min() else { return };
         let mut traffic = Vec::with_capacity(self.boats.len() + 1);
         for number in first..last {
@@ -255,7 +289,9 @@ impl Fleet {
             traffic.extend(self.traffic(time_s));
             let driven = self.driven_at(time_s);
             for i in 0..self.boats.len() {
-                if !self.boats[i].history.is_crewed() {
+                let history = &self.boats[i].history;
+                // One that joined just now begins at a later step than others go on from.
+                if !self.boats[i].is_here() || !history.is_crewed() || history.newest() != number {
                     continue;
                 }
                 // The boat's own place among the others is taken by the own ship.
@@ -504,7 +540,8 @@ impl Fleet {
     fn swims_at(&self, boat: usize, time_s: f64) -> bool {
         /// Waves and the end that goes down last.
         const SLACK_M: f64 = 2.0;
-        let settled_m = self.boats.get(boat).map(|b| b.history.settled_m(time_s));
+        let here = self.boats.get(boat).filter(|b| b.is_here() && b.history.begins_s() <= time_s);
+        let settled_m = here.map(|b| b.history.settled_m(time_s));
         settled_m.is_some_and(|settled_m| settled_m <= self.height_m(boat) + SLACK_M)
     }
 

@@ -47,6 +47,7 @@ fn crewed(name: &str, plan: &Arc<CrewPlan>, bearing_deg: f64, range_m: f64, side
         heading: bearing + PI,
         speed_m_s: 0.0,
         on_target_s: None,
+        begins_s: 0.0,
     };
     Vessel {
         name: name.to_owned(),
@@ -55,6 +56,7 @@ fn crewed(name: &str, plan: &Arc<CrewPlan>, bearing_deg: f64, range_m: f64, side
         behaviour: Behaviour::Crewed(start),
         lights: LightsKept::None,
         burns_at_s: None,
+        in_reserve: false,
     }
 }
 
@@ -392,6 +394,7 @@ fn crowd(count: usize) -> Vec<Vessel> {
         behaviour,
         lights: LightsKept::None,
         burns_at_s: None,
+        in_reserve: false,
     });
     vessels
 }

@@ -4,6 +4,7 @@
 
 pub mod boats;
 pub mod burst;
+pub mod clock;
 mod contact;
 pub mod exercise;
 pub mod flare;

@@ -5,6 +5,7 @@ use std::{collections::VecDeque, sync::Arc};
 use glam::DVec3;
 
 use super::{
+    clock::ExerciseClock,
     exercise::{ExerciseEvent, ExerciseFact, ExerciseWatch, WatchedBoat, pointed_at},
     flare::Flare,
     fleet::{Fleet, Vessel},
@@ -24,6 +25,7 @@ use crate::{
     estimate::sea::SeaConditions,
     event::{ShipFix, TriggerEdge},
     model::{Model, ModelId, Zone},
+    order::{InstructorOrder, JoinPlace, Order},
     time::Time,
 };
 
@@ -82,9 +84,14 @@ pub struct World {
     waves: WaveField,
     sea_change: SeaChange,
     running: Option<RunningWorld>,
+    clock: ExerciseClock,
+    /// Boats of the reserve that are to join with the next call.
+    joining: Vec<(String, Option<JoinPlace>)>,
     watch: ExerciseWatch,
     /// What happened in the exercise within the last call.
     events: Vec<ExerciseEvent>,
+    /// Pauses that the next call gives as events, times of the host.
+    pauses: Vec<ExerciseEvent>,
     /// Tracks of boats and rounds that the last call added.
     tracks: TrackBlock,
     sampler: Option<TrackSampler>,
@@ -161,6 +168,7 @@ impl RunningWorld {
             Some(WatchedBoat {
                 name: fleet.name(boat),
                 side: fleet.side(boat)?,
+                in_reserve: fleet.in_reserve(boat),
                 range_m: at.truncate().distance(eye.truncate()),
                 speed_m_s,
                 off_bore: aim
@@ -206,8 +214,11 @@ impl World {
             waves: scenario.wave_field(),
             sea_change: SeaChange::new(&scenario.waves),
             running: None,
+            clock: ExerciseClock::default(),
+            joining: Vec::new(),
             watch: ExerciseWatch::new(scenario.exercise.clone()),
             events: Vec::new(),
+            pauses: Vec::new(),
             tracks: TrackBlock::default(),
             sampler: None,
             message: None,
@@ -239,16 +250,44 @@ impl World {
 
     /// Takes in an edge of the trigger.
     pub fn trigger(&mut self, edge: TriggerEdge) {
-        self.weapon.edge(edge);
+        self.weapon.edge(TriggerEdge { time: self.clock.of_host(edge.time), ..edge });
     }
 
     /// Takes in place and time that the ship's instruments told.
     pub fn ship_fix(&mut self, fix: &ShipFix) {
-        self.light.fix(fix);
+        self.light.fix(&ShipFix { arrival: self.clock.of_host(fix.arrival), ..*fix });
+    }
+
+    /// Takes in an order of the instructor's. One that is none is left out: its sender has been refused by [`Order::check`].
+    pub fn order(&mut self, order: &InstructorOrder) {
+        /// More wait only while no picture has come.
+        const WAITING_MAX: usize = 64;
+        if order.order.check().is_err() {
+            return;
+        }
+        match &order.order {
+            Order::Pause => {
+                let time = self.clock.pause(order.time);
+                self.pauses.extend(time.map(|time| ExerciseEvent { time, fact: ExerciseFact::Paused }));
+            }
+            Order::Resume => {
+                let time = self.clock.resume(order.time);
+                self.pauses.extend(time.map(|time| ExerciseEvent { time, fact: ExerciseFact::Resumed }));
+            }
+            Order::Join { boat, at } => {
+                if self.joining.len() < WAITING_MAX {
+                    self.joining.push((boat.clone(), *at));
+                }
+            }
+            Order::Rules { .. } | Order::Stoppage | Order::Message { .. } | Order::Note { .. } => {
+                self.watch.order(order.order.clone());
+            }
+        }
     }
 
     /// Takes in an act of the trainee.
     pub fn act(&mut self, act: TraineeAct) {
+        let act = TraineeAct { time: self.clock.of_host(act.time), ..act };
         if let Act::Drive(order) = act.act {
             /// More wait only while no picture has come.
             const WAITING_MAX: usize = 256;
@@ -266,7 +305,7 @@ impl World {
 
     /// Arms or disarms the weapon.
     pub fn arm(&mut self, armed: bool) {
-        self.weapon.arm(armed);
+        self.weapon.arm(armed && !self.clock.is_paused());
     }
 
     /// Fires what the trigger asks for up to `known` and follows boats and rounds up to `until`, or as far as they were followed
@@ -281,6 +320,22 @@ impl World {
     ) {
         self.events.clear();
         self.tracks.clear();
+        self.clock.follow(until);
+        let clock = self.clock.clone();
+        let [begin, until, known] = [begin, until, known].map(|time| clock.of_host(time));
+        self.step(begin, until, known, |time| aim(clock.to_host(time)), records);
+        self.give_host_times(records);
+    }
+
+    /// Steps the exercise in its own time.
+    fn step(
+        &mut self,
+        begin: Time,
+        until: Time,
+        known: Time,
+        mut aim: impl FnMut(Time) -> BoreAim,
+        records: &mut Vec<ShotRecord>,
+    ) {
         let mut running = self.running.take().unwrap_or_else(|| self.begin(begin));
         let now = running.now.max(until);
         for (time, order) in self.driving.drain(..) {
@@ -291,6 +346,7 @@ impl World {
         while let Some((time, seeing)) = self.light.next_note(running.start, now) {
             running.fleet.see_by(time, seeing);
         }
+        self.have_join(&mut running, now);
         self.shine(&mut running, now, &mut aim);
         let was_stopped = self.weapon.state() == WeaponState::Stoppage;
         while let Some(fired) = self.weapon.fire(known.min(now)) {
@@ -323,6 +379,45 @@ impl World {
         self.watch_exercise(&mut running, aim(now));
         self.running = Some(running);
         self.count(records);
+    }
+
+    /// Boats of the reserve join at `now`.
+    fn have_join(&mut self, running: &mut RunningWorld, now: Time) {
+        for (boat, at) in self.joining.drain(..) {
+            for joined in running.fleet.join(&boat, at, now) {
+                let Some(side) = running.fleet.side(joined) else { continue };
+                let place = running.fleet.middle(joined, now).unwrap_or_default();
+                let fact = ExerciseFact::Joined {
+                    boat: running.fleet.name(joined).to_owned(),
+                    side,
+                    range_m: place.truncate().length(),
+                    is_to_stop: self.watch.stops_one_more(side),
+                };
+                self.events.push(ExerciseEvent { time: now, fact });
+            }
+        }
+    }
+
+    /// Puts what the last call gave from the exercise's time into the host's.
+    fn give_host_times(&mut self, records: &mut [ShotRecord]) {
+        let clock = &self.clock;
+        let to_host = |time: &mut Time| *time = clock.to_host(*time);
+        for record in records {
+            to_host(&mut record.fired);
+            if let Outcome::Hit { time, .. } | Outcome::Miss { time, .. } = &mut record.outcome {
+                to_host(time);
+            }
+        }
+        self.events.iter_mut().for_each(|event| to_host(&mut event.time));
+        self.events.splice(0..0, self.pauses.drain(..));
+        let host_ns = |ns: &mut i64| *ns = clock.to_host(Time::from_ns(*ns)).ns();
+        self.tracks.samples.iter_mut().for_each(|sample| host_ns(&mut sample.time_ns));
+        self.tracks.rounds.iter_mut().for_each(|round| host_ns(&mut round.fired_ns));
+    }
+
+    /// The clock of the exercise, which stands while it is paused.
+    pub const fn clock(&self) -> &ExerciseClock {
+        &self.clock
     }
 
     /// Notes where the searchlight's beam went up to `now`, before boats are followed that far.
@@ -427,6 +522,7 @@ impl World {
         }
         self.count_fragments();
         self.count(records);
+        self.give_host_times(records);
     }
 
     /// Lets the waves, and with them boats, go over to a sea that was measured. What was followed up to now stays as it was.

@@ -41,6 +41,7 @@ use bowwave_core::{
     event::{CameraFrame, ImuSample, Mark, Picture, ShipFix, ShipSample, Tick, TriggerEdge},
     fault::FaultChange,
     geometry::CameraPose,
+    order::InstructorOrder,
     time::Time,
 };
 
@@ -79,6 +80,8 @@ pub enum Entry {
     Mark(Mark),
     /// An act of the trainee.
     Act(TraineeAct),
+    /// An order of the instructor.
+    Order(InstructorOrder),
     /// Where the camera really was (recordings with known truth).
     Truth(PoseEntry),
     /// The pose that a session used.
@@ -105,6 +108,7 @@ impl Entry {
             Self::Ship(line) => line.arrival,
             Self::Mark(mark) => mark.time,
             Self::Act(act) => act.time,
+            Self::Order(order) => order.time,
             Self::Truth(pose) | Self::Pose(pose) => pose.time,
             Self::Picture(picture) => picture.arrival,
             Self::ShipValues(sample) => sample.arrival,
@@ -217,6 +221,8 @@ pub struct Counts {
     pub marks: u64,
     /// Acts of the trainee.
     pub acts: u64,
+    /// Orders of the instructor.
+    pub orders: u64,
     /// True poses.
     pub truths: u64,
     /// Poses that were used.
@@ -240,6 +246,7 @@ impl Counts {
             + self.ship
             + self.marks
             + self.acts
+            + self.orders
             + self.truths
             + self.poses
             + self.ship_values
@@ -257,6 +264,7 @@ impl Counts {
             Topic::Ship => &mut self.ship,
             Topic::Mark => &mut self.marks,
             Topic::Act => &mut self.acts,
+            Topic::Order => &mut self.orders,
             Topic::Truth => &mut self.truths,
             Topic::Pose => &mut self.poses,
             Topic::ShipValues => &mut self.ship_values,

@@ -8,6 +8,7 @@ use bowwave_core::{
     event::{ImuSample, Mark, MarkKind, Picture, PixelFormat, ShipFix, ShipSample, Tick, TriggerEdge},
     fault::{Change, Fault, FaultChange},
     geometry::CameraPose,
+    order::{InstructorOrder, Order},
     time::{NS_PER_S, Time},
 };
 use byteorder::{BigEndian, LittleEndian};
@@ -238,6 +239,11 @@ pub(crate) fn encode(entry: &Entry, out: &mut Vec<u8>) -> Result<Topic, String> 
             write(out, &Text { data: act.act.name().to_owned() })?;
             Ok(Topic::Act)
         }
+        Entry::Order(order) => {
+            let data = serde_json::to_string(&order.order).map_err(|e| e.to_string())?;
+            write(out, &Text { data })?;
+            Ok(Topic::Order)
+        }
         Entry::Truth(pose) => {
             write(out, &pose_message(pose)?)?;
             Ok(Topic::Truth)
@@ -343,6 +349,12 @@ pub(crate) fn decode(
             let known = Act::ALL.into_iter().find(|act| act.name() == name);
             let act = known.ok_or_else(|| format!("an act {name:?}, which this version does not know"))?;
             Entry::Act(TraineeAct { time: arrival, act })
+        }
+        Topic::Order => {
+            let known = serde_json::from_str::<Order>(&read::<Text>(data)?.data);
+            let order = known.map_err(|e| format!("an order that this version does not know: {e}"))?;
+            order.check().map_err(|e| format!("an order that is none: {e}"))?;
+            Entry::Order(InstructorOrder { time: arrival, order })
         }
         Topic::Truth => Entry::Truth(pose_entry(&read(data)?, arrival)?),
         Topic::Pose => Entry::Pose(pose_entry(&read(data)?, arrival)?),

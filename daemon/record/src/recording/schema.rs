@@ -18,6 +18,7 @@ pub(crate) enum Topic {
     Ship,
     Mark,
     Act,
+    Order,
     Truth,
     Pose,
     ImageRaw,
@@ -28,7 +29,7 @@ pub(crate) enum Topic {
 }
 
 impl Topic {
-    pub(crate) const ALL: [Self; 14] = [
+    pub(crate) const ALL: [Self; 15] = [
         Self::Image,
         Self::CameraInfo,
         Self::Imu,
@@ -36,6 +37,7 @@ impl Topic {
         Self::Ship,
         Self::Mark,
         Self::Act,
+        Self::Order,
         Self::Truth,
         Self::Pose,
         Self::ImageRaw,
@@ -54,6 +56,7 @@ impl Topic {
             Self::Ship => "/ship",
             Self::Mark => "/mark",
             Self::Act => "/act",
+            Self::Order => "/order",
             Self::Truth => "/truth/pose",
             Self::Pose => "/pose",
             Self::ImageRaw => "/camera/image_raw",
@@ -71,7 +74,7 @@ impl Topic {
             Self::Imu => "sensor_msgs/msg/Imu",
             Self::Trigger => "std_msgs/msg/Bool",
             Self::Ship => "nmea_msgs/msg/Sentence",
-            Self::Mark | Self::Act => "std_msgs/msg/String",
+            Self::Mark | Self::Act | Self::Order => "std_msgs/msg/String",
             Self::Truth | Self::Pose => "geometry_msgs/msg/PoseStamped",
             Self::ImageRaw => "sensor_msgs/msg/Image",
             Self::ShipValues => "bowwave_msgs/msg/ShipValues",
@@ -93,7 +96,7 @@ impl Topic {
             Self::Imu => &[("", IMU), HEADER, TIME, QUATERNION, VECTOR3],
             Self::Trigger => &[("", "bool data\n")],
             Self::Ship => &[("", "std_msgs/Header header\nstring sentence\n"), HEADER, TIME],
-            Self::Mark | Self::Act => &[("", "string data\n")],
+            Self::Mark | Self::Act | Self::Order => &[("", "string data\n")],
             Self::Truth | Self::Pose => {
                 &[("", "std_msgs/Header header\nPose pose\n"), HEADER, TIME, POSE, POINT, QUATERNION]
             }

@@ -155,6 +155,7 @@ impl Recorder {
             }
             Event::Mark(mark) => entry(Entry::Mark(*mark)),
             Event::Act(act) => entry(Entry::Act(*act)),
+            Event::Order(order) => entry(Entry::Order(order.clone())),
             Event::Frame(frame) => match &frame.jpeg {
                 Some(jpeg) => entry(Entry::Frame(frame_entry(frame, jpeg.clone()))),
                 None if self.exact_pixels => entry(Entry::Picture(PictureEntry {
@@ -240,6 +241,7 @@ fn time_of(event: &Event) -> Option<Time> {
         Event::ShipFix(fix) => Some(fix.arrival),
         Event::Mark(mark) => Some(mark.time),
         Event::Act(act) => Some(act.time),
+        Event::Order(order) => Some(order.time),
         Event::Frame(frame) => Some(frame.arrival),
         Event::Fault(_) => None,
     }

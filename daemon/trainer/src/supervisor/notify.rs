@@ -96,6 +96,7 @@ pub fn status_text(hud: &Hud, warnings: impl Iterator<Item = Fault>) -> String {
         Status::NeutralHit { zone } => format!("NEUTRAL HIT: {}", zone.name().to_uppercase()),
         Status::Miss => "MISS".to_owned(),
         Status::NotChecked { cause } => format!("NOT CHECKED: {cause}"),
+        Status::Paused => "PAUSED".to_owned(),
         Status::NotScored { cause, .. } => format!("NOT SCORED: {cause}"),
         Status::Fault { cause, .. } => format!("FAULT: {cause}"),
     };

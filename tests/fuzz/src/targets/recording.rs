@@ -76,6 +76,7 @@ fn check_entry(entry: &Entry) {
         | Entry::Trigger(_)
         | Entry::Mark(_)
         | Entry::Act(_)
+        | Entry::Order(_)
         | Entry::ShipFix(_)
         | Entry::Fault(_)
         | Entry::Tick(_) => {}
@@ -96,6 +97,7 @@ fn count(counts: &mut Counts, entry: &Entry) {
         Entry::Ship(_) => &mut counts.ship,
         Entry::Mark(_) => &mut counts.marks,
         Entry::Act(_) => &mut counts.acts,
+        Entry::Order(_) => &mut counts.orders,
         Entry::Truth(_) => &mut counts.truths,
         Entry::Pose(_) => &mut counts.poses,
         Entry::ShipValues(_) => &mut counts.ship_values,

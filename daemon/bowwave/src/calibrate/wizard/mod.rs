@@ -96,7 +96,8 @@ impl Guided {
             | Event::Ship(_)
             | Event::ShipFix(_)
             | Event::Mark(_)
-            | Event::Act(_) => {}
+            | Event::Act(_)
+            | Event::Order(_) => {}
         }
     }
 

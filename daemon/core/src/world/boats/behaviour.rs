@@ -9,6 +9,7 @@ use super::{
     crew::CrewPlan,
     drive::Propulsor,
 };
+use crate::geometry::heading_of;
 
 /// The behaviour of a boat, as a scenario gives it.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,6 +41,8 @@ pub struct CrewedStart {
     pub speed_m_s: f64,
     /// When it is to be where it attacks from, seconds since the scenario began; `None` as soon as it can.
     pub on_target_s: Option<f64>,
+    /// When it begins, seconds since the scenario began: 0 but for a boat of the reserve.
+    pub begins_s: f64,
 }
 
 impl CrewedStart {
@@ -62,11 +65,49 @@ impl Behaviour {
         }
     }
 
-    /// State of the boat as the scenario begins.
+    /// When it begins, seconds since the scenario began.
+    pub const fn begins_s(&self) -> f64 {
+        match self {
+            Self::ScriptedCourse(course) => course.begins_s(),
+            Self::Crewed(start) => start.begins_s,
+        }
+    }
+
+    /// State of the boat as it begins.
     pub fn begin(&self) -> CourseState {
         match self {
-            Self::ScriptedCourse(course) => course.state(0.0, &BoatDamage::NONE),
+            Self::ScriptedCourse(course) => course.state(course.begins_s(), &BoatDamage::NONE),
             Self::Crewed(start) => start.course(),
+        }
+    }
+
+    /// The same about another place: the gun's `middle` of it is taken to `to`, world x and y, metres, and headings turn with the bearing. A course
+    /// that is known beforehand stays where it is.
+    #[must_use]
+    pub fn moved(self, middle: DVec2, to: DVec2) -> Self {
+        match self {
+            Self::Crewed(start) => {
+                let turn = heading_of(to) - heading_of(middle);
+                let off = start.position - middle;
+                let (sin, cos) = turn.sin_cos();
+                // Clockwise from north, as headings count.
+                let off = DVec2::new(off.x * cos + off.y * sin, off.y * cos - off.x * sin);
+                Self::Crewed(CrewedStart { position: to + off, heading: start.heading + turn, ..start })
+            }
+            scripted => scripted,
+        }
+    }
+
+    /// The same, begun so many seconds after the scenario.
+    #[must_use]
+    pub fn begun_at(self, seconds: f64) -> Self {
+        match self {
+            Self::Crewed(start) => Self::Crewed(CrewedStart {
+                begins_s: seconds,
+                on_target_s: start.on_target_s.map(|due| due + seconds),
+                ..start
+            }),
+            Self::ScriptedCourse(course) => Self::ScriptedCourse(course.begun_at(seconds)),
         }
     }
 

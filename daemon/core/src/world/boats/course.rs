@@ -175,6 +175,8 @@ pub enum CourseError {
 pub struct Course {
     track: CourseTrack,
     speed_m_s: f64,
+    /// When it begins, seconds since the scenario began.
+    begins_s: f64,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -196,7 +198,18 @@ impl Course {
 
     fn of(path: CoursePath, start: DVec2, heading: f64, speed_m_s: f64) -> Result<Self, CourseError> {
         check_finite(start, heading, speed_m_s)?;
-        Ok(Self { track: CourseTrack::CoursePath(path), speed_m_s })
+        Ok(Self { track: CourseTrack::CoursePath(path), speed_m_s, begins_s: 0.0 })
+    }
+
+    /// The same, begun so many seconds after the scenario.
+    #[must_use]
+    pub fn begun_at(self, seconds: f64) -> Self {
+        Self { begins_s: seconds, ..self }
+    }
+
+    /// When it begins, seconds since the scenario began.
+    pub const fn begins_s(&self) -> f64 {
+        self.begins_s
     }
 
     /// Weaves about a straight line: `amplitude_m` to each side, once in `period_s`. The root mean square of its speed over
@@ -216,7 +229,8 @@ impl Course {
             return Err(CourseError::Weave { amplitude_m, period_s, sideways_m_s, speed_m_s });
         }
         let forward_m_s = (speed_m_s * speed_m_s - sideways_m_s * sideways_m_s / 2.0).sqrt();
-        Ok(Self { track: CourseTrack::Weave { start, heading, forward_m_s, amplitude_m, rad_s }, speed_m_s })
+        let track = CourseTrack::Weave { start, heading, forward_m_s, amplitude_m, rad_s };
+        Ok(Self { track, speed_m_s, begins_s: 0.0 })
     }
 
     /// Sails from `start` along `points` and lies still at the last, or goes back to the start and round again for ever.
@@ -247,7 +261,7 @@ impl Course {
             return Err(CourseError::SharpCorner { index: (index + 1) % n });
         }
         let path = path::along(&all, TURN_RADIUS_M, repeat);
-        Ok(Self { track: CourseTrack::CoursePath(path), speed_m_s })
+        Ok(Self { track: CourseTrack::CoursePath(path), speed_m_s, begins_s: 0.0 })
     }
 
     /// Turns towards the own ship at (0, 0), closes to `stop_m` and then lies still or circles at that distance.
@@ -274,7 +288,7 @@ impl Course {
         if arrival == Arrival::Circle {
             path = path.turn(-(radius / (stop_m + radius)).acos(), radius).turn(f64::INFINITY, stop_m);
         }
-        Ok(Self { track: CourseTrack::CoursePath(path), speed_m_s })
+        Ok(Self { track: CourseTrack::CoursePath(path), speed_m_s, begins_s: 0.0 })
     }
 
     /// Greatest speed over ground on this course, m/s.
@@ -289,7 +303,8 @@ impl Course {
 
     /// Where the boat is `time_s` seconds after the scenario began (the start before that).
     pub fn state(&self, time_s: f64, damage: &BoatDamage) -> CourseState {
-        let time_s = time_s.max(0.0);
+        let time_s = (time_s - self.begins_s).max(0.0);
+        let damage = &damage.since(self.begins_s);
         let (under_way_s, share) = damage.under_way(time_s);
         let helm_s = damage.helm_s.map(|s| s.max(0.0)).filter(|&s| s < time_s);
         let Some(helm_s) = helm_s else {
@@ -371,6 +386,18 @@ impl BoatDamage {
     /// When its engine failed, or will.
     pub fn engine_lost_s(&self) -> Option<f64> {
         self.engine_s.into_iter().chain(self.drowned_s).reduce(f64::min)
+    }
+
+    /// The same on a clock that begins at `begins_s`.
+    fn since(&self, begins_s: f64) -> Self {
+        let since = |at: Option<f64>| at.map(|s| s - begins_s);
+        Self {
+            engine_s: since(self.engine_s),
+            helm_s: since(self.helm_s),
+            drowned_s: since(self.drowned_s),
+            fire_s: since(self.fire_s),
+            first_s: since(self.first_s),
+        }
     }
 
     /// Seconds that an undamaged boat would have needed for the way made until `time_s`, and the share of its speed left.

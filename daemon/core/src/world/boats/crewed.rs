@@ -9,7 +9,7 @@ use super::{
     course::{BoatDamage, CourseState},
     crew::{Act, CrewMemory, CrewPlan, CrewState, Signals, Situation, Traffic},
     drive::{Craft, DriveState, Orders, Surroundings},
-    grid::{GridHistory, STEP_S, seconds},
+    grid::{GridHistory, STEP_S, seconds, step_after},
     hull::HullForm,
     lights::Conduct,
     seakeeping::FAR_M,
@@ -63,7 +63,9 @@ impl CrewedBoat {
         let craft = Craft::new(form, start.propulsor, start.speed_max_m_s);
         let drive = DriveState::steady(&craft, start.position, start.heading, start.speed_m_s);
         let mut kept = GridHistory::new(KEPT);
-        kept.restart(0, Crewed { drive, memory: CrewMemory { from: drive.centre, ..CrewMemory::default() } });
+        let (since_s, leg_since_s) = (start.begins_s, start.begins_s);
+        let memory = CrewMemory { from: drive.centre, since_s, leg_since_s, ..CrewMemory::default() };
+        kept.restart(step_after(start.begins_s), Crewed { drive, memory });
         let CrewedStart { plan, chance: seed, keeps_rules, on_target_s, .. } = start;
         Self { plan, craft, seed, keeps_rules, on_target_s, kept }
     }

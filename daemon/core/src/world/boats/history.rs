@@ -37,19 +37,28 @@ pub struct BoatHistory {
     hull: Hull,
     states: GridHistory<CourseState>,
     seakeeping: SeakeepingState,
+    /// Step at which it begins: 0 but for a boat of the reserve.
+    begins: i64,
 }
 
 impl BoatHistory {
-    /// A boat as the scenario begins.
+    /// A boat as it begins: with the scenario, or later where its behaviour is [`Behaviour::begun_at`].
     pub fn new(behaviour: Behaviour, hull: Hull, form: HullForm) -> Self {
         let mut states = GridHistory::new(KEPT);
-        states.restart(0, behaviour.begin());
+        let begins = step_after(behaviour.begins_s());
+        states.restart(begins, behaviour.begin());
         let pilot = match behaviour {
             Behaviour::ScriptedCourse(course) => Pilot::Scripted(course),
             Behaviour::Crewed(start) => Pilot::Crewed(Box::new(CrewedBoat::new(start, &form))),
         };
         let (damage, flooding) = (BoatDamage::NONE, Flooding::default());
-        Self { pilot, damage, flooding, hull, states, seakeeping: SeakeepingState::new(form) }
+        let seakeeping = SeakeepingState::new(form).begun_at(begins);
+        Self { pilot, damage, flooding, hull, states, seakeeping, begins }
+    }
+
+    /// The same boat, as nothing had happened to it, with that behaviour.
+    pub fn restart(&mut self, behaviour: Behaviour) {
+        *self = Self::new(behaviour, self.hull, self.seakeeping.form().clone());
     }
 
     /// The hull's size at the waterline.
@@ -68,7 +77,9 @@ impl BoatHistory {
         if let Pilot::Scripted(course) = &self.pilot {
             let last = step_after(until_s);
             if self.states.newest().is_none_or(|newest| last.saturating_sub(newest) > GAP) {
-                let first = if last <= GAP { 0 } else { last.saturating_sub(KEPT as i64 - 1).max(0) };
+                let begins = self.begins;
+                let is_young = last.saturating_sub(begins) <= GAP;
+                let first = if is_young { begins } else { last.saturating_sub(KEPT as i64 - 1).max(begins) };
                 self.states.restart(first, course.state(seconds(first), &self.damage));
             }
             while let Some(newest) = self.states.newest()
@@ -82,6 +93,11 @@ impl BoatHistory {
             // Motion in waves begins as of a boat that lies where the scenario begins.
             self.seakeeping.follow(until_s, |time_s| state_in(states, time_s.max(0.0)), waves);
         }
+    }
+
+    /// When it begins, seconds since the scenario began; the past of one that is there from the start is known before.
+    pub(crate) fn begins_s(&self) -> f64 {
+        if self.begins > 0 { seconds(self.begins) } else { f64::NEG_INFINITY }
     }
 
     /// Step of the newest state.

@@ -26,12 +26,19 @@ pub struct SeakeepingState {
     motions: GridHistory<BoatMotion>,
     /// The water at the step of that number, the newest.
     water: Option<(i64, Box<HullWater>)>,
+    /// Step at which the boat begins.
+    begins: i64,
 }
 
 impl SeakeepingState {
     /// A boat whose motion has not begun.
     pub fn new(form: HullForm) -> Self {
-        Self { form, motions: GridHistory::new(KEPT), water: None }
+        Self { form, motions: GridHistory::new(KEPT), water: None, begins: 0 }
+    }
+
+    /// The same for a boat that begins at that step.
+    pub fn begun_at(self, begins: i64) -> Self {
+        Self { begins, ..self }
     }
 
     /// Follows the boat on its course (a state by seconds) up to `until_s`. Does nothing for what is already followed.
@@ -40,7 +47,8 @@ impl SeakeepingState {
         let start = match self.motions.newest() {
             Some(newest) if last.saturating_sub(newest) <= GAP => newest,
             _ => {
-                let first = if last <= GAP { 0 } else { last - KEPT as i64 };
+                let is_young = last.saturating_sub(self.begins) <= GAP;
+                let first = if is_young { self.begins } else { last - KEPT as i64 };
                 let plane = self.plane(first, &course, waves);
                 self.motions.restart(first, plane);
                 first

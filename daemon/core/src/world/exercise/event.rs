@@ -132,6 +132,29 @@ pub enum ExerciseFact {
     },
     /// The virtual weapon has a stoppage.
     Stoppage,
+    /// An instructor ordered that the weapon has one with its next round.
+    StoppageOrdered,
+    /// The exercise stands still from now on.
+    Paused,
+    /// It goes on.
+    Resumed,
+    /// A boat of the reserve joined.
+    Joined {
+        /// Its name.
+        boat: String,
+        /// Whom it belongs to.
+        #[serde(with = "by_name")]
+        side: Side,
+        /// Where.
+        range_m: f64,
+        /// The goals ask for one more boat to be stopped.
+        is_to_stop: bool,
+    },
+    /// A note of the instructor's for the debrief.
+    Note {
+        /// The text.
+        text: String,
+    },
     /// The barrel is so hot that rounds scatter.
     BarrelHot,
     /// Fragments of a round that burst beside a boat struck its crew; the round's own record names another boat, or none.

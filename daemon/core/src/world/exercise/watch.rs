@@ -6,6 +6,7 @@ use super::{
 };
 use crate::{
     act::{Act, TraineeAct},
+    order::Order,
     side::Side,
     time::Time,
     world::{flare::FlareSpec, seeing::threshold::SEEN},
@@ -28,6 +29,8 @@ pub struct WatchedBoat<'a> {
     pub name: &'a str,
     /// Whom it belongs to.
     pub side: Side,
+    /// It waits in reserve: nothing is noted of it.
+    pub in_reserve: bool,
     /// Distance from the gun, metres.
     pub range_m: f64,
     /// Speed through the water, m/s.
@@ -75,6 +78,7 @@ pub struct ExerciseWatch {
     rules: Engagement,
     happened: Vec<bool>,
     acts: Vec<TraineeAct>,
+    orders: Vec<Order>,
     begun: Option<Time>,
     is_decided: bool,
 }
@@ -90,6 +94,9 @@ pub struct WatchOrders {
     pub flares: Vec<FlareSpec>,
 }
 
+/// Most acts, or orders, that wait: more come only while there is no picture.
+const WAITING_MAX: usize = 256;
+
 impl ExerciseWatch {
     /// For an exercise that has not begun.
     pub fn new(spec: ExerciseSpec) -> Self {
@@ -99,6 +106,7 @@ impl ExerciseWatch {
             spec,
             boats: Vec::new(),
             acts: Vec::new(),
+            orders: Vec::new(),
             begun: None,
             is_decided: false,
         }
@@ -116,11 +124,21 @@ impl ExerciseWatch {
 
     /// Takes in an act. It counts with the next [`Self::follow`].
     pub fn act(&mut self, act: TraineeAct) {
-        /// More wait only while no picture has come.
-        const WAITING_MAX: usize = 256;
         if self.acts.len() < WAITING_MAX {
             self.acts.push(act);
         }
+    }
+
+    /// Takes in an order of the instructor's: one of rules, text or stoppage. It counts with the next [`Self::follow`].
+    pub fn order(&mut self, order: Order) {
+        if self.orders.len() < WAITING_MAX {
+            self.orders.push(order);
+        }
+    }
+
+    /// Tests whether the goals ask for one more to be stopped where a boat of that side joins.
+    pub const fn stops_one_more(&self, side: Side) -> bool {
+        matches!(side, Side::Hostile) && self.spec.goals.stop.is_none()
     }
 
     /// Looks at all boats at `time`, and adds what happened since the last look to `events`.
@@ -133,7 +151,7 @@ impl ExerciseWatch {
     ) -> WatchOrders {
         let mut note = |fact| events.push(ExerciseEvent { time, fact });
         let begun = self.begun.unwrap_or_else(|| {
-            let hostile = boats.iter().filter(|b| b.side == Side::Hostile).count() as u32;
+            let hostile = boats.iter().filter(|b| b.side == Side::Hostile && !b.in_reserve).count() as u32;
             let ExerciseSpec { goals, self_defence_m, .. } = self.spec;
             note(ExerciseFact::Began {
                 rounds,
@@ -150,11 +168,11 @@ impl ExerciseWatch {
         self.begun = Some(begun);
         self.boats.resize_with(boats.len(), BoatNotes::default);
         let mut orders = WatchOrders::default();
-        for (boat, notes) in boats.iter().zip(&mut self.boats) {
+        for (boat, notes) in boats.iter().zip(&mut self.boats).filter(|(boat, _)| !boat.in_reserve) {
             notes.look(boat, time, &self.spec, &mut note);
         }
-        let mut threats =
-            boats.iter().zip(&self.boats).filter(|(boat, _)| boat.side == Side::Hostile).peekable();
+        let is_threat = |boat: &WatchedBoat<'_>| boat.side == Side::Hostile && !boat.in_reserve;
+        let mut threats = boats.iter().zip(&self.boats).filter(|(boat, _)| is_threat(boat)).peekable();
         self.is_decided =
             threats.peek().is_some() && threats.all(|(_, notes)| notes.is_stopped || notes.is_away);
         for TraineeAct { time, act } in std::mem::take(&mut self.acts) {
@@ -174,7 +192,30 @@ impl ExerciseWatch {
             }
         }
         self.happen(time, begun, boats, &mut orders, events);
+        self.obey(time, &mut orders, events);
         orders
+    }
+
+    /// What the instructor ordered happens.
+    fn obey(&mut self, time: Time, orders: &mut WatchOrders, events: &mut Vec<ExerciseEvent>) {
+        for order in std::mem::take(&mut self.orders) {
+            let fact = match order {
+                Order::Rules { rules } => {
+                    // From now on there are rules, also where the scenario gave none.
+                    self.spec.rules.get_or_insert(rules);
+                    self.rules = rules;
+                    ExerciseFact::Rules { rules }
+                }
+                Order::Stoppage => {
+                    orders.stoppage = true;
+                    ExerciseFact::StoppageOrdered
+                }
+                Order::Message { text } => ExerciseFact::Message { text },
+                Order::Note { text } => ExerciseFact::Note { text },
+                Order::Join { .. } | Order::Pause | Order::Resume => continue,
+            };
+            events.push(ExerciseEvent { time, fact });
+        }
     }
 
     /// What is due happens, once.
@@ -191,7 +232,8 @@ impl ExerciseWatch {
             let is_due = match &happening.cause {
                 HappeningCause::At(seconds) => time.secs_since(begun) >= *seconds,
                 HappeningCause::Within(about, metres) => {
-                    boats.iter().any(|b| about.covers(b.name, b.side) && b.range_m <= *metres)
+                    let is_within = |b: &WatchedBoat<'_>| !b.in_reserve && b.range_m <= *metres;
+                    boats.iter().any(|b| about.covers(b.name, b.side) && is_within(b))
                 }
                 HappeningCause::Struck(about) => {
                     boats.iter().any(|b| about.covers(b.name, b.side) && b.struck.is_some_and(|s| s <= time))

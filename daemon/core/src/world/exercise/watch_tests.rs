@@ -7,6 +7,7 @@ fn at(seconds: f64) -> Time {
 
 fn skiff(range_m: f64, speed_m_s: f64) -> WatchedBoat<'static> {
     WatchedBoat {
+        in_reserve: false,
         name: "skiff-1",
         side: Side::Hostile,
         range_m,

@@ -65,6 +65,7 @@ pub(super) struct RawBoat {
     keeps_rules: OptionalKey<bool>,
     lights: OptionalKey<String>,
     burns_at_s: OptionalKey<f64>,
+    reserve: OptionalKey<bool>,
     count: OptionalKey<i64>,
     formation: OptionalKey<String>,
     spacing_m: OptionalKey<f64>,
@@ -173,9 +174,10 @@ fn group(
     let usual = if side == Side::Neutral { LightsKept::ByConduct } else { LightsKept::None };
     let lights = text.given(&raw.lights, one_of(&LightsKept::NAMES))?.unwrap_or(usual);
     let burns_at_s = text.given(&raw.burns_at_s, seconds())?;
+    let in_reserve = text.given(&raw.reserve, yes_no())?.unwrap_or(false);
     let boat = |name: String, behaviour| {
         let model = named("model", &raw.model, "the name of a model or the path of a glTF or PNG file")?;
-        Ok(BoatSpec { name, model, side, behaviour, lights, burns_at_s, stands: stands.clone() })
+        Ok(BoatSpec { name, model, side, behaviour, lights, burns_at_s, in_reserve, stands: stands.clone() })
     };
     let behaviours = match (&raw.course, &raw.crew) {
         (Some(_), Some(crew)) => {
@@ -265,6 +267,7 @@ fn crewed(
                 heading,
                 speed_m_s: speed * M_S_PER_KN,
                 on_target_s,
+                begins_s: 0.0,
             }));
         }
     }

@@ -141,6 +141,8 @@ pub struct BoatSpec {
     pub lights: LightsKept,
     /// When it is on fire by itself, seconds after the beginning; `None` for one that only rounds set on fire.
     pub burns_at_s: Option<f64>,
+    /// It waits until an instructor has it join.
+    pub in_reserve: bool,
     /// Where the text places it.
     pub(super) stands: TomlPlace,
 }

@@ -10,7 +10,10 @@ use crate::{
     model::Zone,
     side::Side,
     time::Time,
-    world::exercise::{Engagement, ExerciseEvent, ExerciseFact},
+    world::{
+        clock::ExerciseClock,
+        exercise::{Engagement, ExerciseEvent, ExerciseFact},
+    },
 };
 
 /// Version of what the points mean. 1: as [`ScoreSheet::points`] says.
@@ -21,6 +24,8 @@ const BURST_GAP_S: f64 = 2.0;
 /// All that one run left, to be scored.
 #[derive(Clone, Debug, Default)]
 pub struct ScoreFold {
+    /// Time for which the exercise stood still does not count.
+    clock: ExerciseClock,
     begun: Option<Time>,
     ended: Option<Time>,
     goals: Option<GoalsAsked>,
@@ -258,7 +263,12 @@ impl ScoreFold {
 
     /// Takes in an event.
     pub fn event(&mut self, event: &ExerciseEvent) {
-        let time = event.time;
+        match event.fact {
+            ExerciseFact::Paused => self.clock.pause(event.time),
+            ExerciseFact::Resumed => self.clock.resume(event.time),
+            _ => None,
+        };
+        let time = self.clock.of_host(event.time);
         match &event.fact {
             ExerciseFact::Began { hostile, stop, keep_off_m, self_defence_m, .. } => {
                 self.begun = Some(time);
@@ -304,7 +314,17 @@ impl ScoreFold {
             ExerciseFact::Fragments { .. } => {}
             ExerciseFact::Sank { boat, .. } => self.boat(boat).sank = true,
             ExerciseFact::CaughtFire { boat, .. } => self.boat(boat).burns = true,
-            ExerciseFact::Message { .. } => {}
+            ExerciseFact::Joined { side, is_to_stop, .. } => {
+                if let Some(goals) = &mut self.goals {
+                    goals.hostile += u32::from(*side == Side::Hostile);
+                    goals.stop += u32::from(*is_to_stop);
+                }
+            }
+            ExerciseFact::Message { .. }
+            | ExerciseFact::Note { .. }
+            | ExerciseFact::StoppageOrdered
+            | ExerciseFact::Paused
+            | ExerciseFact::Resumed => {}
             ExerciseFact::Missed { why, .. } => {
                 self.misses.extend(Some(*why).filter(MissExplanation::was_aimed))
             }
@@ -323,7 +343,7 @@ impl ScoreFold {
 
     /// Takes in a round.
     pub fn shot(&mut self, shot: &ShotRecord) {
-        let fired = shot.fired;
+        let fired = self.clock.of_host(shot.fired);
         let (boat, zone, side, is_scored) = match &shot.outcome {
             Outcome::Hit { boat, zone, side, .. } => {
                 (Some(boat.clone()), Some(*zone), Some(side.unwrap_or(Side::Hostile)), true)

@@ -67,6 +67,13 @@ fn look(status: &Status) -> Look<'_> {
             cause,
             action: "LOOK AT THE HORIZON",
         },
+        Status::Paused => Look {
+            shape: SHAPE_SQUARE,
+            colour: WHITE,
+            word: "PAUSED",
+            cause: "",
+            action: "WAIT FOR THE INSTRUCTOR",
+        },
         Status::NotScored { cause, action } => {
             Look { shape: SHAPE_TRIANGLE, colour: AMBER, word: "NOT SCORED", cause, action }
         }

@@ -144,11 +144,15 @@ fn no_two_states_have_shape_and_colour_in_common() {
         Status::Miss,
         // Ready, but for its colour.
         Status::NotChecked { cause },
+        Status::Paused,
         Status::NotScored { cause, action },
         Status::Fault { cause, action },
     ];
     let words: Vec<_> = states.iter().map(|s| look(s).word).collect();
-    assert_eq!(words, ["READY", "HIT", "NEUTRAL HIT", "MISS", "NOT CHECKED", "NOT SCORED", "FAULT"]);
+    assert_eq!(
+        words,
+        ["READY", "HIT", "NEUTRAL HIT", "MISS", "NOT CHECKED", "PAUSED", "NOT SCORED", "FAULT"]
+    );
     let mut icons = Vec::new();
     for status in states {
         let quads = layout.lay_out(&glyphs, &hud(status, None));
