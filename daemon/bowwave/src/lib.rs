@@ -12,6 +12,7 @@ mod desk;
 mod doctor;
 pub mod ending;
 mod hits;
+mod instructed;
 mod laboratory;
 pub mod licences;
 pub mod loading;

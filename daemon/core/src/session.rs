@@ -7,6 +7,8 @@ mod digest;
 mod notes;
 mod setup;
 
+use glam::DVec3;
+
 use crate::{
     calibration::Calibration,
     estimate::{
@@ -106,6 +108,21 @@ impl Session {
     /// The virtual world as it is now.
     pub const fn world(&self) -> &World {
         &self.world
+    }
+
+    /// Faults that are there now.
+    pub fn faults(&self) -> impl Iterator<Item = Fault> + '_ {
+        self.faults.active()
+    }
+
+    /// Direction of the barrel at the newest picture, world, unit vector, and the picture's width as an angle, radians; `None` while the pose is not
+    /// known.
+    pub fn gun(&self) -> Option<(DVec3, f64)> {
+        let time = self.estimator.video_time()?;
+        let pose = self.estimator.camera(time).ok()?.pose;
+        let lens = &self.composer.scene().lens;
+        let half = 0.5 * f64::from(lens.width) / lens.focal.x;
+        Some((pose.world_from_camera * self.calibration.bore_in_camera(), 2.0 * half.atan()))
     }
 
     /// Counts of sensor data that were not used so far.

@@ -13,6 +13,8 @@
 pub mod clock;
 mod companion;
 pub mod divergence;
+pub mod instructor;
+mod options;
 pub mod presenter;
 pub mod replay;
 pub mod source;
@@ -23,4 +25,5 @@ mod trainer;
 
 pub use clock::TickClock;
 pub use companion::Companion;
-pub use trainer::{Ended, Finished, Signals, Trainer, TrainerOptions};
+pub use options::{Ended, Finished, ReloadCause, Signals, TrainerOptions};
+pub use trainer::Trainer;

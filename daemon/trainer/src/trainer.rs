@@ -1,22 +1,21 @@
 //! The main loop: the only place below which nothing reads a clock.
 
 use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, atomic::Ordering},
     thread,
     time::Duration,
 };
 
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
+    act::TraineeAct,
     event::{Event, Mark, MarkKind},
-    fault::{Change, Fault, FaultChange},
+    fault::{Change, DevicePart, Fault, FaultChange},
     frame::scene::Scene,
     guide::Guide,
     model::Model,
-    session::{Note, Session, Setup, View},
+    order::{InstructorOrder, Order},
+    session::{Note, Session, View},
     time::{NS_PER_S, Time},
 };
 use bowwave_devices::clock::now;
@@ -26,10 +25,12 @@ use bowwave_render::RenderError;
 use crate::{
     clock::{DueFrame, TickClock},
     companion::Companion,
+    instructor::{AskedScenario, InstructorPort, Request, status_of},
+    options::{Ended, Finished, ReloadCause, Signals, TrainerOptions},
     presenter::{Handed, Presented, Presenter, PresenterOptions, UserEvent},
     source::Source,
     storage::Storage,
-    summary::{Summary, SummaryOptions, Tally},
+    summary::Tally,
     supervisor::{FaultLog, LoadWatch, Notifier, Pulse},
 };
 
@@ -40,63 +41,6 @@ const LOSSES_WINDOW_NS: i64 = 60 * NS_PER_S;
 const FAREWELL: Duration = Duration::from_millis(120);
 /// A recording whose first picture takes longer than this has none to speak of.
 const FIRST_PICTURE_NS: i64 = 5 * NS_PER_S;
-
-/// Requests from outside to the loop.
-#[derive(Debug, Default)]
-pub struct Signals {
-    /// End.
-    pub stop: AtomicBool,
-    /// Read the settings anew.
-    pub reload: AtomicBool,
-    /// The gun stands at its stow.
-    pub rezero: AtomicBool,
-}
-
-/// Why the loop ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ended {
-    /// It was asked to, or has drawn all frames.
-    Stopped,
-    /// The settings are to be read anew, or the LCD has another size now.
-    Reload {
-        /// Size of the LCD at that time: one that is slow to start is not waited for again.
-        lcd: Option<(u32, u32)>,
-    },
-}
-
-/// Settings of a trainer. Source, clock and storage are opened by the caller, since what may be wrong with them differs.
-#[derive(Debug)]
-pub struct TrainerOptions {
-    /// What the session is made from.
-    pub setup: Setup,
-    /// How frames are drawn and where they go; `None` draws nothing.
-    pub presenter: Option<PresenterOptions>,
-    /// End after so many frames.
-    pub frames: Option<u64>,
-    /// The run is to reach the end of its recording, so that how that ends is looked at.
-    pub plays_to_the_end: bool,
-    /// A size of the LCD other than the session's asks for new settings.
-    pub follow_lcd: bool,
-    /// This boot, for the log.
-    pub boot_id: Option<String>,
-    /// What the summary says besides what was measured.
-    pub summary: SummaryOptions,
-    /// Faults that were found before the trainer was made.
-    pub faults: Vec<FaultChange>,
-}
-
-/// A trainer that has ended.
-#[derive(Debug)]
-pub struct Finished {
-    /// Why.
-    pub ended: Ended,
-    /// What it reports about itself.
-    pub summary: Summary,
-    /// What went wrong on the way without ending the run.
-    pub wrong: Vec<String>,
-    /// Messages of Vulkan's validation layer.
-    pub validation: Vec<String>,
-}
 
 /// Everything that a frame passes through.
 pub struct Trainer {
@@ -113,6 +57,10 @@ pub struct Trainer {
     changes: Vec<FaultChange>,
     tally: Tally,
     load: LoadWatch,
+    /// Parts that the source has.
+    parts: Vec<DevicePart>,
+    /// The scenario that the instructor asked for.
+    asked: Option<AskedScenario>,
     /// The companion has ended.
     is_dialogue_over: bool,
 }
@@ -136,7 +84,12 @@ impl Trainer {
             }
         };
         let faults = FaultLog::new(options.boot_id.clone());
+        let mut events = Vec::with_capacity(256);
+        if options.waits {
+            events.push(Event::Order(InstructorOrder { time: now(), order: Order::Pause }));
+        }
         let tally = Tally::new(&options.summary);
+        let parts = source.parts();
         Ok(Self {
             options,
             signals,
@@ -147,22 +100,34 @@ impl Trainer {
             storage,
             faults,
             losses: Vec::new(),
-            events: Vec::with_capacity(256),
+            events,
             changes,
             tally,
             load: LoadWatch::default(),
+            parts,
+            asked: None,
             is_dialogue_over: false,
         })
     }
 
     /// Runs until it is asked to end, or all frames are drawn. What is recorded is complete when this returns, also with an error.
     pub fn run(self, notifier: &mut Notifier, pulse: Option<&Pulse>) -> Result<Finished> {
-        self.run_with(notifier, pulse, None)
+        self.run_with(notifier, pulse, None, None)
+    }
+
+    /// The same with an instructor joined.
+    pub fn run_instructed(
+        self,
+        notifier: &mut Notifier,
+        pulse: Option<&Pulse>,
+        instructor: &mut InstructorPort,
+    ) -> Result<Finished> {
+        self.run_with(notifier, pulse, None, Some(instructor))
     }
 
     /// Runs until `companion` ends.
     pub fn accompany(self, companion: &mut dyn Companion) -> Result<Finished> {
-        self.run_with(&mut Notifier::from_environment(), None, Some(companion))
+        self.run_with(&mut Notifier::from_environment(), None, Some(companion), None)
     }
 
     fn run_with(
@@ -170,9 +135,10 @@ impl Trainer {
         notifier: &mut Notifier,
         pulse: Option<&Pulse>,
         companion: Option<&mut dyn Companion>,
+        instructor: Option<&mut InstructorPort>,
     ) -> Result<Finished> {
         let trains = companion.is_none();
-        let ended = self.frames(notifier, pulse, companion);
+        let ended = self.frames(notifier, pulse, companion, instructor);
         let _pulsing = pulse.map(Pulse::during);
         if matches!(ended, Ok(Ended::Stopped) | Err(_)) {
             notifier.stopping();
@@ -188,6 +154,7 @@ impl Trainer {
         notifier: &mut Notifier,
         pulse: Option<&Pulse>,
         mut companion: Option<&mut dyn Companion>,
+        mut instructor: Option<&mut InstructorPort>,
     ) -> Result<Ended> {
         if companion.is_none() {
             self.await_first_picture()?;
@@ -207,8 +174,11 @@ impl Trainer {
             } else if asked_to_stop {
                 break;
             }
-            if self.signals.reload.swap(false, Ordering::Relaxed) || self.screen_changed() {
-                return Ok(Ended::Reload { lcd: self.source.lcd_size() });
+            if let Some(instructor) = &mut instructor {
+                self.obey(instructor);
+            }
+            if let Some(cause) = self.reload_cause() {
+                return Ok(Ended::Reload { lcd: self.source.lcd_size(), cause });
             }
             // Once more as a plain reference: the loop goes on with it.
             match self.frame(due, pulse, companion.as_mut().map(|c| &mut **c as &mut dyn Companion)) {
@@ -221,6 +191,31 @@ impl Trainer {
             }
         }
         Ok(Ended::Stopped)
+    }
+
+    fn reload_cause(&mut self) -> Option<ReloadCause> {
+        if let Some(asked) = self.asked.take() {
+            return Some(ReloadCause::Asked(asked));
+        }
+        if self.signals.reload.swap(false, Ordering::Relaxed) {
+            return Some(ReloadCause::Settings);
+        }
+        self.screen_changed().then_some(ReloadCause::Screen)
+    }
+
+    /// Takes in what the instructor asks for, and says how things are.
+    fn obey(&mut self, instructor: &mut InstructorPort) {
+        for request in instructor.requests() {
+            match request {
+                Request::Act(act) => self.events.push(Event::Act(TraineeAct { time: now(), act })),
+                Request::Order(order) => match self.session.world().refuses(&order) {
+                    Some(why) => instructor.refuse(why),
+                    None => self.events.push(Event::Order(InstructorOrder { time: now(), order })),
+                },
+                Request::Load(asked) => self.asked = Some(asked),
+            }
+        }
+        instructor.tell(now(), || status_of(&self.session, &self.parts));
     }
 
     fn is_over(&self, is_dialogue: bool) -> bool {

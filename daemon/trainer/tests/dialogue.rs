@@ -103,6 +103,7 @@ fn pages_are_drawn_over_pictures_of_any_layout_and_over_none() {
         boot_id: None,
         summary: SummaryOptions { program_start: Time::from_ns(0), ..SummaryOptions::default() },
         faults: Vec::new(),
+        waits: false,
     };
     let source = Source::Feed(EventFeed::new(events));
     let trainer = Trainer::start(options, source, TickClock::paced(), None, Arc::new(Signals::default()))

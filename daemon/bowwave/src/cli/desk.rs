@@ -74,6 +74,9 @@ pub struct Play {
     /// Play without a clock, as fast as it goes, repeatable to the byte; for scripts and simulated gunners
     #[arg(long)]
     pub fast: bool,
+    /// Let an instructor join through this socket (see `bowwave instructor`): the exercise waits for a start, and others can follow it
+    #[arg(long, value_name = "SOCKET", conflicts_with_all = ["fast", "record", "video", "sheet", "stills"])]
+    pub instructor: Option<PathBuf>,
     /// Outputs
     #[command(flatten)]
     pub desk: DeskArgs,

@@ -75,6 +75,17 @@ pub struct Config {
     pub files: FileSettings,
     /// Sensors that are watched besides the devices.
     pub health: HealthSettings,
+    /// The socket of the instructor's process.
+    pub instructor: InstructorSettings,
+}
+
+/// The table `[instructor]`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct InstructorSettings {
+    /// The socket that the instructor's process connects to; none without it.
+    pub socket: Option<PathBuf>,
+    /// Folder of the instructor's scenarios: models that these name lie there.
+    pub scenarios: Option<PathBuf>,
 }
 
 /// Settings of the GPIO lines, those of the operator's buttons left out.
@@ -131,6 +142,14 @@ struct RawConfig {
     gpu: RawGpu,
     files: RawFiles,
     health: RawHealth,
+    instructor: RawInstructor,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawInstructor {
+    socket: Option<PathBuf>,
+    scenarios: Option<PathBuf>,
 }
 
 #[derive(Default, Deserialize)]
@@ -247,6 +266,10 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
             data: raw.files.data.map(|p| base.join(p)),
         },
         health: HealthSettings { thermal: raw.health.thermal, temperature_c_max },
+        instructor: InstructorSettings {
+            socket: raw.instructor.socket.map(|p| base.join(p)),
+            scenarios: raw.instructor.scenarios.map(|p| base.join(p)),
+        },
         warnings,
     })
 }

@@ -16,10 +16,11 @@ use bowwave_core::{pacing::FRAMES_PER_S, session::Setup, time::Time, world::scen
 use bowwave_record::{JournalOptions, Properties, Run, RunDetails};
 use bowwave_trainer::{
     Finished, Signals, TickClock, Trainer, TrainerOptions,
+    instructor::InstructorPort,
     presenter::{GpuSettings, OutputOptions, PresenterOptions, Seat},
     replay::session_properties,
     source::Source,
-    storage::{RecorderOptions, Storage, StorageOptions},
+    storage::{JOURNAL, RecorderOptions, Storage, StorageOptions},
     summary::SummaryOptions,
     supervisor::Notifier,
 };
@@ -75,6 +76,18 @@ pub struct DeskRun<'a> {
     pub plays_to_the_end: bool,
     /// Part of the summary that is not measured.
     pub summary: SummaryOptions,
+    /// The instructor, where one may join.
+    pub instruction: Option<Instruction<'a>>,
+}
+
+/// Part of a run with an instructor.
+pub struct Instruction<'a> {
+    /// The socket.
+    pub port: &'a mut InstructorPort,
+    /// It is the program's first run: what lies in the folder is of others.
+    pub is_first: bool,
+    /// It is what is shown between exercises.
+    pub is_stand_by: bool,
 }
 
 /// The user's interrupts.
@@ -150,24 +163,37 @@ pub fn check(arguments: &DeskArgs, frames: u64) -> Result<()> {
 
 /// Runs the trainer until the run's end, or until it is interrupted.
 pub fn run(run: DeskRun<'_>, arguments: &DeskArgs, interrupts: &Interrupts) -> Result<Finished> {
-    let DeskRun { prepared, frames, source, clock, origin, plays_to_the_end, summary } = run;
+    let DeskRun { prepared, frames, source, clock, origin, plays_to_the_end, summary, instruction } = run;
     let realtime = clock.is_paced();
     let mut faults = Vec::new();
-    let storage = Storage::open(storage(arguments, prepared, realtime, origin), &mut faults)?;
-    // Not before the folder is this run's own.
-    leftovers::clear(&arguments.out, prepared.record)?;
+    let is_kept = instruction.as_ref().is_none_or(|instruction| !instruction.is_stand_by);
+    let storage = is_kept.then(|| Storage::open(storage(arguments, prepared, realtime, origin), &mut faults));
+    let storage = storage.transpose()?;
+    if instruction.as_ref().is_none_or(|instruction| instruction.is_first) {
+        // Not before the folder is this run's own.
+        leftovers::clear(&arguments.out, prepared.record)?;
+    }
+    let mut outputs = presenter(arguments, prepared, realtime, frames);
+    outputs.output.tap = instruction.as_ref().map(|instruction| instruction.port.tap());
     let options = TrainerOptions {
         setup: prepared.setup.clone(),
-        presenter: Some(presenter(arguments, prepared, realtime, frames)),
+        presenter: Some(outputs),
         frames: Some(frames),
         plays_to_the_end,
         follow_lcd: false,
         boot_id: None,
         summary,
         faults,
+        waits: instruction.is_some(),
     };
-    let trainer = Trainer::start(options, source, clock, Some(storage), Arc::clone(&interrupts.signals))?;
-    let mut finished = trainer.run(&mut Notifier::from_environment(), None)?;
+    let trainer = Trainer::start(options, source, clock, storage, Arc::clone(&interrupts.signals))?;
+    let mut notifier = Notifier::from_environment();
+    if let Some(Instruction { port, is_stand_by, .. }) = instruction {
+        port.begin_session(Some(&arguments.out.join(JOURNAL)), is_stand_by);
+        // An interrupt is its usual end.
+        return trainer.run_instructed(&mut notifier, None, port);
+    }
+    let mut finished = trainer.run(&mut notifier, None)?;
     let done = finished.summary.frames;
     if interrupts.interrupted.load(Ordering::Relaxed) && done < frames {
         let cut =

@@ -10,10 +10,11 @@ use bowwave_core::{
     session::Setup,
     text::toml::TEXT_BYTES_MAX,
     time::Time,
+    world::scenario::Scenario,
 };
 use bowwave_files::plain_text;
 use bowwave_trainer::{
-    TickClock,
+    Ended, Finished, ReloadCause, TickClock,
     presenter::Seat,
     source::{LiveSource, Source},
     summary::SummaryOptions,
@@ -27,7 +28,8 @@ use crate::{
     cache,
     cli::{Play, ScoreArgs},
     config::Config,
-    desk::{self, DeskRun, PreparedRun},
+    desk::{self, DeskRun, Instruction, Interrupts, PreparedRun},
+    instructed,
     loading::{LoadedScenario, parse_scenario, read_scenario},
     outcome::Outcome,
     score, stdout,
@@ -43,10 +45,9 @@ enum Aimer {
     Script(Script),
 }
 
-/// Plays a scenario.
+/// Plays a scenario, and where an instructor may join those that are asked for.
 pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
     let desk_args = &arguments.desk;
-    let config = desk::config(desk_args)?;
     let aimer = aimer(&arguments.aim)?;
     if matches!(aimer, Aimer::Mouse) && (arguments.fast || desk_args.headless) {
         bail!(
@@ -54,66 +55,140 @@ pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
         );
     }
     let (text, base) = read_scenario(&arguments.scenario)?;
-    let mut loaded = parse_scenario(&text, &arguments.scenario.display().to_string(), &base)?;
-    // The sea is the scenario's, whatever the seed of its chance.
-    let recipe = PanoramaRecipe::of_scenario(&loaded.scenario, arguments.camera);
-    if let Some(seed) = desk_args.seed {
-        loaded.scenario.seed = seed;
+    let loaded = parse_scenario(&text, &arguments.scenario.display().to_string(), &base)?;
+    let mut playing = Playing { loaded, text, base: base.clone(), is_stand_by: false };
+    let config = desk::config(desk_args)?;
+    let scenarios = config.instructor.scenarios.clone().unwrap_or(base);
+    let camera = arguments.camera;
+    let sea = move |scenario: &Scenario| sea_of(scenario, camera).map(drop);
+    let listen = |socket: &PathBuf| instructed::listen(socket, scenarios.clone(), sea);
+    let mut port = arguments.instructor.as_ref().map(listen).transpose()?;
+    // Making a sea is ended at once by an interrupt, so these are caught once the first one is made.
+    let mut interrupts = None;
+    let mut is_first = true;
+    let seat = PlayerSeat { arguments, aimer, config, program_start };
+    loop {
+        let instruction =
+            port.as_mut().map(|port| Instruction { port, is_first, is_stand_by: playing.is_stand_by });
+        let scenario = playing.loaded.scenario.clone();
+        let finished = seat.play(playing, instruction, &mut interrupts)?;
+        is_first = false;
+        if let Ended::Reload { cause: ReloadCause::Asked(asked), .. } = &finished.ended {
+            let mut loaded = instructed::load(asked, &scenarios)?;
+            if asked.is_stand_by {
+                // A simulated sea goes on.
+                let (exercise, boats) = (loaded.scenario.exercise, Vec::new());
+                loaded.scenario = Scenario { boats, exercise, weapon: loaded.scenario.weapon, ..scenario };
+            }
+            let (text, base) = (asked.text.clone(), scenarios.clone());
+            playing = Playing { loaded, text, base, is_stand_by: asked.is_stand_by };
+            continue;
+        }
+        let outcome = desk::report(finished, desk_args)?;
+        // An instructor's review has the score of each run.
+        if !desk_args.json && port.is_none() {
+            score::run(&ScoreArgs { run: desk_args.out.clone(), number: None, json: false })?;
+        }
+        return Ok(outcome);
     }
-    let scenario = &loaded.scenario;
-    let frames = desk::frames_asked(desk_args).unwrap_or_else(|| desk::frames_of(desk::length_s(scenario)));
-    desk::check(desk_args, frames)?;
+}
+
+/// A scenario that is played.
+struct Playing {
+    loaded: LoadedScenario,
+    text: String,
+    base: PathBuf,
+    is_stand_by: bool,
+}
+
+/// The sea of a scenario for such a camera, made now where it is not there yet.
+fn sea_of(scenario: &Scenario, camera: (u32, u32)) -> Result<(PanoramaRecipe, PathBuf)> {
+    let recipe = PanoramaRecipe::of_scenario(scenario, camera);
     let drawable = "the sea of this scenario cannot be drawn: change mount.eye_height_m or sea.beaufort in it, or give another --camera";
     recipe.check().context(drawable)?;
     let panorama = cache::panorama(&recipe)?;
-    // Not before: an interrupt ends the making of a sea at once.
-    let interrupts = desk::catch_interrupts()?;
-    if let Some(briefing) = scenario.exercise.briefing.as_deref().filter(|_| !desk_args.json) {
-        stdout::print(format!("{}\n\n{briefing}\n\n", scenario.name))?;
-    }
-    let (gunner, script) = match &aimer {
-        Aimer::Mouse => (None, None),
-        Aimer::Gunner(skill) => (Some(Gunner::new(scenario, skill).within(TRAVERSE_MAX)), None),
-        Aimer::Script(script) => (None, Some(script.clone())),
-    };
-    let prepared = prepare(arguments, config, &aimer, &recipe, (loaded, text, base));
-    let realtime = !arguments.fast;
-    let simulated = Live::start(LiveOptions {
-        recipe: &recipe,
-        panorama: &panorama,
-        hands: Hands::default(),
-        script,
-        realtime,
-        is_coded: prepared.record,
-    })?;
-    let lens = &prepared.setup.calibration.lens;
-    let source = LiveSource::new(simulated, f64::from(lens.width) / lens.focal.x, gunner);
-    let origin = source.origin();
-    let finished = desk::run(
-        DeskRun {
-            prepared: &prepared,
-            frames,
-            source: Source::Live(Box::new(source)),
-            clock: if realtime { TickClock::paced() } else { TickClock::fast(origin) },
-            origin,
-            plays_to_the_end: false,
-            summary: SummaryOptions { program_start, recording: None, injected: None },
-        },
-        desk_args,
-        &interrupts,
-    )?;
-    let late = finished.summary.counts.get("pictures_late").copied().unwrap_or(0);
-    if late > 0 {
-        log::warn!(
-            "the simulated camera left out {late} pictures: this computer cuts them too slowly; play without --record and --video, or \
+    Ok((recipe, panorama))
+}
+
+/// What does not change from one scenario to the next.
+struct PlayerSeat<'a> {
+    arguments: &'a Play,
+    aimer: Aimer,
+    config: Config,
+    program_start: Time,
+}
+
+impl PlayerSeat<'_> {
+    /// Plays one scenario to its end.
+    fn play(
+        &self,
+        playing: Playing,
+        instruction: Option<Instruction<'_>>,
+        interrupts: &mut Option<Interrupts>,
+    ) -> Result<Finished> {
+        let Self { arguments, aimer, config, program_start } = self;
+        let desk_args = &arguments.desk;
+        let Playing { mut loaded, text, base, .. } = playing;
+        // The sea is the scenario's, whatever the seed of its chance.
+        let (recipe, panorama) = sea_of(&loaded.scenario, arguments.camera)?;
+        if let Some(seed) = desk_args.seed {
+            loaded.scenario.seed = seed;
+        }
+        let scenario = &loaded.scenario;
+        let asked = desk::frames_asked(desk_args);
+        // An instructor ends the exercise.
+        let length =
+            || if instruction.is_some() { u64::MAX } else { desk::frames_of(desk::length_s(scenario)) };
+        let frames = asked.unwrap_or_else(length);
+        desk::check(desk_args, frames)?;
+        if interrupts.is_none() {
+            *interrupts = Some(desk::catch_interrupts()?);
+        }
+        let interrupts = interrupts.as_ref().context("interrupts are caught")?;
+        if let Some(briefing) = scenario.exercise.briefing.as_deref().filter(|_| !desk_args.json) {
+            stdout::print(format!("{}\n\n{briefing}\n\n", scenario.name))?;
+        }
+        let (gunner, script) = match aimer {
+            Aimer::Mouse => (None, None),
+            Aimer::Gunner(skill) => (Some(Gunner::new(scenario, skill).within(TRAVERSE_MAX)), None),
+            Aimer::Script(script) => (None, Some(script.clone())),
+        };
+        let prepared = prepare(arguments, config.clone(), aimer, &recipe, (loaded, text, base));
+        let realtime = !arguments.fast;
+        let simulated = Live::start(LiveOptions {
+            recipe: &recipe,
+            panorama: &panorama,
+            hands: Hands::default(),
+            script,
+            realtime,
+            is_coded: prepared.record,
+        })?;
+        let lens = &prepared.setup.calibration.lens;
+        let source = LiveSource::new(simulated, f64::from(lens.width) / lens.focal.x, gunner);
+        let origin = source.origin();
+        let finished = desk::run(
+            DeskRun {
+                prepared: &prepared,
+                frames,
+                source: Source::Live(Box::new(source)),
+                clock: if realtime { TickClock::paced() } else { TickClock::fast(origin) },
+                origin,
+                plays_to_the_end: false,
+                summary: SummaryOptions { program_start: *program_start, recording: None, injected: None },
+                instruction,
+            },
+            desk_args,
+            interrupts,
+        )?;
+        let late = finished.summary.counts.get("pictures_late").copied().unwrap_or(0);
+        if late > 0 {
+            log::warn!(
+                "the simulated camera left out {late} pictures: this computer cuts them too slowly; play without --record and --video, or \
              give --camera 640x360, which is a quarter of the work"
-        );
+            );
+        }
+        Ok(finished)
     }
-    let outcome = desk::report(finished, desk_args)?;
-    if !desk_args.json {
-        score::run(&ScoreArgs { run: desk_args.out.clone(), number: None, json: false })?;
-    }
-    Ok(outcome)
 }
 
 /// The run of a loaded scenario, whose text and folder are given, on a simulated gun.

@@ -22,10 +22,11 @@ use bowwave_core::{
 use bowwave_devices::clock::now;
 use bowwave_record::{JournalOptions, Run as JournalRun, RunDetails};
 use bowwave_trainer::{
-    Ended, Signals, TickClock, Trainer, TrainerOptions,
+    Ended, ReloadCause, Signals, TickClock, Trainer, TrainerOptions,
+    instructor::{AskedScenario, InstructorPort, PictureTap},
     presenter::{GpuSettings, OutputOptions, PresenterOptions},
     source::{Devices, Source},
-    storage::{Storage, StorageOptions},
+    storage::{JOURNAL, Storage, StorageOptions},
     summary::SummaryOptions,
     supervisor::{CrashLoopGuard, Mode, Notifier, Pulse},
 };
@@ -34,7 +35,12 @@ use signal_hook::{
     iterator::Signals as Incoming,
 };
 
-use crate::{cli::RunArgs, config::ScreenOutput, outcome::Outcome};
+use crate::{
+    cli::RunArgs,
+    config::{InstructorSettings, ScreenOutput},
+    instructed,
+    outcome::Outcome,
+};
 pub(crate) use recording::recording_in;
 use settings::{Reader, Settings};
 
@@ -52,9 +58,10 @@ pub fn run(arguments: &RunArgs, program_start: Time) -> Result<Outcome> {
     // The folder of the last good settings cannot be configured by settings that may be bad.
     let state = env::var_os("STATE_DIRECTORY").map(PathBuf::from);
     let last_good = arguments.data.clone().or(state.clone()).map(|d| d.join("last-good"));
-    let reader = Reader::new(arguments.config.clone(), last_good);
+    let mut reader = Reader::new(arguments.config.clone(), last_good);
+    let mut instructor = None;
     loop {
-        let settings = reader.read()?;
+        let mut settings = reader.read()?;
         let data = arguments
             .data
             .clone()
@@ -65,10 +72,22 @@ pub fn run(arguments: &RunArgs, program_start: Time) -> Result<Outcome> {
             // Hits are kept in memory then, and the LCD says so.
             log::error!("cannot make the data folder {}: {e}; name another in files.data", data.display());
         }
-        let gun = Gun { arguments, data: &data, mode: starts.mode(), program_start, lcd_size };
+        let mode = starts.mode();
+        if mode == Mode::Training {
+            join_instructor(&mut instructor, &mut settings, &data);
+        }
+        let asked = reader.asked.as_ref();
+        let tap = instructor.as_ref().map(|joined: &Joined| joined.port.tap());
+        let gun = Gun { arguments, data: &data, mode, program_start, lcd_size, asked, tap };
         let trainer = gun.start(settings, Arc::clone(&signals))?;
         drop(pulsing);
-        let finished = trainer.run(&mut notifier, Some(&pulse))?;
+        let finished = match &mut instructor {
+            Some(Joined { port, .. }) => {
+                port.begin_session(Some(&data.join(JOURNAL)), asked.is_some_and(|asked| asked.is_stand_by));
+                trainer.run_instructed(&mut notifier, Some(&pulse), port)?
+            }
+            None => trainer.run(&mut notifier, Some(&pulse))?,
+        };
         pulsing = pulse.during();
         if let Err(e) = finished.summary.write(&data.join("summary.json")) {
             log::warn!("{e:#}");
@@ -79,13 +98,43 @@ pub fn run(arguments: &RunArgs, program_start: Time) -> Result<Outcome> {
                 starts.ended_well();
                 return Ok(Outcome::Done);
             }
-            Ended::Reload { lcd } => {
+            Ended::Reload { lcd, cause } => {
                 lcd_size = lcd;
+                match cause {
+                    ReloadCause::Asked(asked) => reader.asked = Some(asked),
+                    // Whoever has the settings read again wants what is configured.
+                    ReloadCause::Settings => reader.asked = None,
+                    ReloadCause::Screen => {}
+                }
                 notifier.reloading();
                 // All of the former run is written, and a request to stop need not wait for files.
                 drop(pulsing);
                 pulsing = pulse.during_start();
             }
+        }
+    }
+}
+
+/// An instructor's socket, with the settings that it was made by.
+struct Joined {
+    settings: InstructorSettings,
+    port: InstructorPort,
+}
+
+/// Listens on the configured socket, unless that is done already. A training goes on without an instructor.
+fn join_instructor(joined: &mut Option<Joined>, settings: &mut Settings, data: &Path) {
+    let wanted = &settings.config.instructor;
+    if joined.as_ref().is_some_and(|joined| joined.settings == *wanted) {
+        return;
+    }
+    // The path may be the same one.
+    *joined = None;
+    let Some(socket) = &wanted.socket else { return };
+    match instructed::listen(socket, instructed::scenarios(&settings.config, Some(data)), |_| Ok(())) {
+        Ok(port) => *joined = Some(Joined { settings: wanted.clone(), port }),
+        Err(e) => {
+            let why = format!("{e:#}; no instructor can join");
+            settings.faults.push(FaultChange::raised(now(), Fault::Config, why));
         }
     }
 }
@@ -98,6 +147,10 @@ struct Gun<'a> {
     program_start: Time,
     /// Size of the LCD before the settings were read anew.
     lcd_size: Option<(u32, u32)>,
+    /// The scenario that the instructor asked for.
+    asked: Option<&'a AskedScenario>,
+    /// The instructor's live picture.
+    tap: Option<Arc<PictureTap>>,
 }
 
 impl Gun<'_> {
@@ -120,6 +173,8 @@ impl Gun<'_> {
         let boot_id = env::var("BOWWAVE_BOOT_ID").ok().or_else(bowwave_record::boot_id);
         let storage = match self.mode {
             Mode::Safe => None,
+            // There is nothing to keep.
+            Mode::Training if self.asked.is_some_and(|asked| asked.is_stand_by) => None,
             Mode::Training => Some(Storage::open(self.storage(&settings, boot_id.clone()), &mut faults)?),
         };
         let config = &settings.config;
@@ -128,6 +183,7 @@ impl Gun<'_> {
             output: OutputOptions {
                 reporter: Some(devices.output_reporter()),
                 lcd: devices.lcd(),
+                tap: self.tap.clone(),
                 frame_hashes: self.arguments.frame_hashes.clone(),
                 window: config.output == ScreenOutput::Window,
                 ..OutputOptions::default()
@@ -142,6 +198,7 @@ impl Gun<'_> {
             boot_id,
             summary: SummaryOptions { program_start: self.program_start, ..SummaryOptions::default() },
             faults,
+            waits: self.asked.is_some(),
         };
         Trainer::start(options, Source::Devices(Box::new(devices)), TickClock::paced(), storage, signals)
     }

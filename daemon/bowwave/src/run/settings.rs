@@ -23,10 +23,12 @@ use bowwave_core::{
 };
 use bowwave_devices::{camera::CameraSettings, clock::now};
 use bowwave_files::plain_text;
+use bowwave_trainer::instructor::AskedScenario;
 use glam::{DQuat, DVec2, DVec3};
 
 use crate::{
     config::{self, Config},
+    instructed,
     loading::{LoadedScenario, parse_scenario, read_scenario, warn_of_former_names},
 };
 
@@ -63,6 +65,8 @@ pub struct Reader {
     pub config: PathBuf,
     /// Folder of the last good copies; none are kept without it.
     pub last_good: Option<PathBuf>,
+    /// The scenario that the instructor asked for, in the configured one's place.
+    pub asked: Option<AskedScenario>,
     /// The files that were named do not answer: a mount hangs.
     is_silent: bool,
 }
@@ -77,7 +81,7 @@ struct Accepted<T> {
 impl Reader {
     /// For that configuration.
     pub const fn new(config: PathBuf, last_good: Option<PathBuf>) -> Self {
-        Self { config, last_good, is_silent: false }
+        Self { config, last_good, asked: None, is_silent: false }
     }
 
     /// Reads everything. Fails only where not even what is built in works. A mount that hangs, as of a stick that was pulled, holds nobody
@@ -192,6 +196,18 @@ impl Reader {
             let LoadedScenario { scenario, models, of_boats } = parse_scenario(text, origin, base)?;
             Ok((scenario, text.to_owned(), models, of_boats, base.to_owned()))
         };
+        if let Some(asked) = &self.asked {
+            let base = instructed::scenarios(config, self.last_good.as_deref().and_then(Path::parent));
+            // It was checked as it was asked for, but files change.
+            match instructed::load(asked, &base) {
+                Ok(LoadedScenario { scenario, models, of_boats }) => {
+                    return Ok((scenario, asked.text.clone(), models, of_boats, base));
+                }
+                Err(why) => {
+                    refuse(Fault::Config, &why_and_instead(&why, "the configured scenario is used"));
+                }
+            }
+        }
         if let Some(path) = &config.files.scenario {
             let named = self.answers(path).and_then(|()| read_scenario(path)).and_then(|(text, base)| {
                 let loaded = load(&text, &path.display().to_string(), &base)?;

@@ -62,6 +62,7 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
                 recording: Some(prepared.path.display().to_string()),
                 injected: Some((origin, plan.faults)),
             },
+            instruction: None,
         },
         desk_args,
         &interrupts,

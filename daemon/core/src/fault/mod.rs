@@ -5,8 +5,10 @@
 
 mod board;
 mod kinds;
+mod part;
 mod permission;
 
 pub use board::{FaultBoard, LogEntry, LogEvent};
 pub use kinds::{Change, Fault, FaultChange, Severity};
+pub use part::DevicePart;
 pub use permission::{FirePermission, NotScored};

@@ -401,6 +401,44 @@ pub enum Status {
     },
 }
 
+/// The words of a state, upper case; empty where there are none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StatusWords {
+    /// The state.
+    pub word: &'static str,
+    /// The cause, or the part that was struck.
+    pub cause: &'static str,
+    /// The one thing to do.
+    pub action: &'static str,
+}
+
+impl Status {
+    /// Its words on the LCD and wherever else it is shown.
+    pub const fn words(&self) -> StatusWords {
+        const fn words(word: &'static str, cause: &'static str, action: &'static str) -> StatusWords {
+            StatusWords { word, cause, action }
+        }
+        match *self {
+            Self::Ready => words("READY", "", ""),
+            Self::Hit { zone } => words("HIT", zone_word(zone), ""),
+            Self::NeutralHit { zone } => words("NEUTRAL HIT", zone_word(zone), "HOLD FIRE"),
+            Self::Miss => words("MISS", "", ""),
+            Self::NotChecked { cause } => words("NOT CHECKED", cause, "LOOK AT THE HORIZON"),
+            Self::Paused => words("PAUSED", "", "WAIT FOR THE INSTRUCTOR"),
+            Self::NotScored { cause, action } => words("NOT SCORED", cause, action),
+            Self::Fault { cause, action } => words("FAULT", cause, action),
+        }
+    }
+}
+
+const fn zone_word(zone: Zone) -> &'static str {
+    match zone {
+        Zone::Hull => "HULL",
+        Zone::Engine => "ENGINE",
+        Zone::Helm => "HELM",
+    }
+}
+
 /// The head-up display. The word TRAINING is always drawn and is no field.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hud {

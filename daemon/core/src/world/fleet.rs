@@ -272,6 +272,23 @@ impl Fleet {
         joining
     }
 
+    /// Why a boat, or a group, of that name cannot join, or not elsewhere than the scenario says; `None` where it can.
+    pub fn refuses(&self, name: &str, is_elsewhere: bool) -> Option<String> {
+        let known = |b: &&FleetBoat| b.name == name || group_of(&b.name) == name;
+        let mut waiting = self.boats.iter().filter(known).filter_map(|b| b.waiting.as_ref()).peekable();
+        if waiting.peek().is_none() {
+            let why = if self.boats.iter().any(|b| known(&b)) {
+                "is on the water already"
+            } else {
+                "is no boat of this scenario's reserve"
+            };
+            return Some(format!("{name} {why}: choose one that waits"));
+        }
+        let is_fixed = |behaviour: &Behaviour| matches!(behaviour, Behaviour::ScriptedCourse(_));
+        (is_elsewhere && waiting.any(is_fixed))
+            .then(|| format!("{name} goes a fixed course: have it join without another place"))
+    }
+
     /// Tests whether a boat waits in reserve.
     pub fn in_reserve(&self, boat: usize) -> bool {
         self.boats.get(boat).is_some_and(|b| !b.is_here())
@@ -537,7 +554,8 @@ impl Fleet {
         self.swims_at(boat, time.secs_since(self.start))
     }
 
-    fn swims_at(&self, boat: usize, time_s: f64) -> bool {
+    /// The same at a time in seconds since the start.
+    pub fn swims_at(&self, boat: usize, time_s: f64) -> bool {
         /// Waves and the end that goes down last.
         const SLACK_M: f64 = 2.0;
         let here = self.boats.get(boat).filter(|b| b.is_here() && b.history.begins_s() <= time_s);

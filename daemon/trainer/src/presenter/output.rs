@@ -27,7 +27,7 @@ use super::{
     video::VideoWriter,
     window::{Pressed, Screen},
 };
-use crate::summary::stats::Samples;
+use crate::{instructor::PictureTap, summary::stats::Samples};
 
 /// How long the thread waits for a frame before it looks whether there will be another.
 const WAIT: Duration = Duration::from_millis(80);
@@ -42,6 +42,8 @@ pub struct OutputOptions {
     pub reporter: Option<Reporter>,
     /// The LCD.
     pub lcd: Option<Arc<LcdPort>>,
+    /// The instructor's live picture.
+    pub tap: Option<Arc<PictureTap>>,
     /// File that gets the SHA-256 of each frame's red, green and blue bytes, newest last, the last few hundred.
     pub frame_hashes: Option<PathBuf>,
     /// Whether to hash all frames into one number for the report.
@@ -305,6 +307,9 @@ impl OutputWorker {
             complete: now(),
             is_late: ticket.deadline.is_some_and(|d| complete > d),
         });
+        if let Some(tap) = &self.options.tap {
+            tap.offer(ticket.frame, complete, frame.rgba(), self.options.size);
+        }
         self.report.frame_ms.push(ms(ticket.begun));
         self.report.gpu_ms.push(ms(ticket.submitted));
         self.report.first.get_or_insert(complete);

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use anyhow::Result;
 use bowwave_core::{
     event::Event,
-    fault::{Fault, FaultChange},
+    fault::{DevicePart, Fault, FaultChange},
     frame::scene::Status,
     time::Time,
 };
@@ -106,6 +106,22 @@ impl Devices {
         let heartbeat_ns = i64::try_from((gpu_timeout + HEARTBEAT_BEYOND).as_nanos()).unwrap_or(i64::MAX);
         let fetched = Vec::new();
         Ok(Self { camera, imu, ship, trigger, lcd, lamps, health, threads, heartbeat_ns, output, fetched })
+    }
+
+    /// Parts that are configured.
+    pub fn parts(&self) -> Vec<DevicePart> {
+        use DevicePart as P;
+        let optional = [
+            (P::Imu, self.imu.is_some()),
+            (P::Registration, self.imu.is_some()),
+            (P::Ship, self.ship.is_some()),
+            (P::Trigger, self.trigger.is_some()),
+            (P::Interlock, self.trigger.is_some()),
+            (P::Display, self.lcd.is_some()),
+        ];
+        let always = [P::Camera, P::Storage, P::Gpu, P::Computer];
+        let configured = optional.into_iter().filter(|(_, is_there)| *is_there).map(|(part, _)| part);
+        always.into_iter().chain(configured).collect()
     }
 
     /// The LCD, to show on.

@@ -4,7 +4,12 @@ mod devices;
 mod live;
 
 use bowwave_core::{
-    event::Event, fault::FaultChange, frame::scene::Status, geometry::CameraPose, time::Time, world::World,
+    event::Event,
+    fault::{DevicePart, FaultChange},
+    frame::scene::Status,
+    geometry::CameraPose,
+    time::Time,
+    world::World,
 };
 use crossbeam_channel::{Receiver, TryRecvError};
 use hw_sim::replay::{Replay, ReplayError, ReplayStats};
@@ -99,6 +104,17 @@ impl Source {
     pub fn watch(&mut self, world: &World) {
         if let Self::Live(live) = self {
             live.watch(world);
+        }
+    }
+
+    /// Parts that it has, or simulates.
+    pub fn parts(&self) -> Vec<DevicePart> {
+        match self {
+            Self::Devices(devices) => devices.parts(),
+            Self::Recording(_) | Self::Live(_) | Self::Feed(_) => {
+                use DevicePart as P;
+                vec![P::Camera, P::Imu, P::Registration, P::Trigger, P::Storage, P::Gpu, P::Computer]
+            }
         }
     }
 

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use bowwave_core::{
     fault::Fault,
-    frame::scene::{Hud, Status},
+    frame::scene::{Hud, StatusWords},
     time::{NS_PER_S, Time},
 };
 use sd_notify::NotifyState;
@@ -90,16 +90,8 @@ fn send(state: &[NotifyState<'_>]) {
 /// What the LCD says, as one line, but with all `warnings` and not only the first:
 /// "NOT SCORED: CAMERA LOST; warning REC: DISK FULL; rounds 120, shots 14, hits 3".
 pub fn status_text(hud: &Hud, warnings: impl Iterator<Item = Fault>) -> String {
-    let mut text = match &hud.status {
-        Status::Ready => "READY".to_owned(),
-        Status::Hit { zone } => format!("HIT: {}", zone.name().to_uppercase()),
-        Status::NeutralHit { zone } => format!("NEUTRAL HIT: {}", zone.name().to_uppercase()),
-        Status::Miss => "MISS".to_owned(),
-        Status::NotChecked { cause } => format!("NOT CHECKED: {cause}"),
-        Status::Paused => "PAUSED".to_owned(),
-        Status::NotScored { cause, .. } => format!("NOT SCORED: {cause}"),
-        Status::Fault { cause, .. } => format!("FAULT: {cause}"),
-    };
+    let StatusWords { word, cause, .. } = hud.status.words();
+    let mut text = if cause.is_empty() { word.to_owned() } else { format!("{word}: {cause}") };
     for (i, warning) in warnings.enumerate() {
         text.push_str(if i == 0 { "; warning " } else { ", " });
         text.push_str(warning.cause());
@@ -113,6 +105,8 @@ pub fn status_text(hud: &Hud, warnings: impl Iterator<Item = Fault>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use bowwave_core::frame::scene::Status;
+
     use super::*;
 
     #[test]

@@ -135,6 +135,7 @@ fn options(
         boot_id: None,
         summary: SummaryOptions::default(),
         faults,
+        waits: false,
     }
 }
 

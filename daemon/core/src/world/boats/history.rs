@@ -155,7 +155,7 @@ impl BoatHistory {
     }
 
     /// When it was first struck, seconds since the scenario began.
-    pub(crate) fn first_hit_s(&self) -> Option<f64> {
+    pub fn first_hit_s(&self) -> Option<f64> {
         self.damage.first_s
     }
 

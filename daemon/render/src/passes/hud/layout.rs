@@ -11,8 +11,7 @@ use std::fmt::Write;
 use bowwave_core::{
     estimate::sea::SeaSource,
     fault::Fault,
-    frame::scene::{Hud, PixelRect, Status},
-    model::Zone,
+    frame::scene::{Hud, PixelRect, Status, StatusWords},
     sea::WmoSeaState,
     world::{exercise::Engagement, weapon::WeaponState},
 };
@@ -36,58 +35,17 @@ const MAGENTA: [f32; 3] = [0.95, 0.16, 0.80];
 /// Plates behind the texts: dark enough for every colour above when the camera looks into the sun.
 const PLATE: [f32; 4] = [0.004, 0.006, 0.010, 0.94];
 
-/// How a state looks.
-struct Look<'a> {
-    shape: u32,
-    colour: [f32; 3],
-    word: &'static str,
-    cause: &'a str,
-    action: &'a str,
-}
-
-fn look(status: &Status) -> Look<'_> {
-    let plain = |shape, colour, word| Look { shape, colour, word, cause: "", action: "" };
-    match *status {
-        Status::Ready => plain(SHAPE_DISC, GREEN, "READY"),
-        Status::Hit { zone } => {
-            Look { shape: SHAPE_RING, colour: CYAN, word: "HIT", cause: zone_word(zone), action: "" }
-        }
-        Status::NeutralHit { zone } => Look {
-            shape: SHAPE_BARRED,
-            colour: MAGENTA,
-            word: "NEUTRAL HIT",
-            cause: zone_word(zone),
-            action: "HOLD FIRE",
-        },
-        Status::Miss => plain(SHAPE_CROSS, WHITE, "MISS"),
-        Status::NotChecked { cause } => Look {
-            shape: SHAPE_DISC,
-            colour: AMBER,
-            word: "NOT CHECKED",
-            cause,
-            action: "LOOK AT THE HORIZON",
-        },
-        Status::Paused => Look {
-            shape: SHAPE_SQUARE,
-            colour: WHITE,
-            word: "PAUSED",
-            cause: "",
-            action: "WAIT FOR THE INSTRUCTOR",
-        },
-        Status::NotScored { cause, action } => {
-            Look { shape: SHAPE_TRIANGLE, colour: AMBER, word: "NOT SCORED", cause, action }
-        }
-        Status::Fault { cause, action } => {
-            Look { shape: SHAPE_SQUARE, colour: RED, word: "FAULT", cause, action }
-        }
-    }
-}
-
-const fn zone_word(zone: Zone) -> &'static str {
-    match zone {
-        Zone::Hull => "HULL",
-        Zone::Engine => "ENGINE",
-        Zone::Helm => "HELM",
+/// Shape and colour of a state.
+const fn look(status: &Status) -> (u32, [f32; 3]) {
+    match status {
+        Status::Ready => (SHAPE_DISC, GREEN),
+        Status::Hit { .. } => (SHAPE_RING, CYAN),
+        Status::NeutralHit { .. } => (SHAPE_BARRED, MAGENTA),
+        Status::Miss => (SHAPE_CROSS, WHITE),
+        Status::NotChecked { .. } => (SHAPE_DISC, AMBER),
+        Status::Paused => (SHAPE_SQUARE, WHITE),
+        Status::NotScored { .. } => (SHAPE_TRIANGLE, AMBER),
+        Status::Fault { .. } => (SHAPE_SQUARE, RED),
     }
 }
 
@@ -223,33 +181,34 @@ impl HudLayout {
 
     /// The state's plate at the lower left; returns its upper edge.
     fn status(&mut self, glyphs: &Glyphs, status: &Status) -> f32 {
-        let look = look(status);
+        let (shape, colour) = look(status);
+        let StatusWords { word, cause, action } = status.words();
         let pad = self.pad();
         let (large, small) = (glyphs.line(TextSize::Large), glyphs.line(TextSize::Small));
         let width = |text: &str| glyphs.width_of(TextSize::Small, text);
         let icon = (large * 0.62).round();
         let text_x = pad * 2.0 + icon + pad;
         let right_max = self.size.0 as f32 - pad;
-        let word_end = text_x + glyphs.width_of(TextSize::Large, look.word);
+        let word_end = text_x + glyphs.width_of(TextSize::Large, word);
         // The cause stands beside the word where there is room, else on a line of its own.
-        let beside = word_end + 2.0 * pad + width(look.cause) + pad <= right_max;
-        let (first, second) = match (look.cause, beside) {
+        let beside = word_end + 2.0 * pad + width(cause) + pad <= right_max;
+        let (first, second) = match (cause, beside) {
             ("", _) => (word_end, ""),
             (cause, true) => (word_end + 2.0 * pad + width(cause), ""),
             (cause, false) => (word_end, cause),
         };
-        let below = [second, look.action].into_iter().filter(|line| !line.is_empty());
+        let below = [second, action].into_iter().filter(|line| !line.is_empty());
         let lines = large + small * below.clone().count() as f32;
         let right = below.clone().map(|line| text_x + width(line)).fold(first, f32::max) + pad;
         let top = (self.size.1 as f32 - pad - lines).round();
         self.plate([pad, top, right.min(right_max), top + lines]);
         let icon_top = top + ((large - icon) / 2.0).round();
-        self.shape(look.shape, [pad * 2.0, icon_top, pad * 2.0 + icon, icon_top + icon], look.colour);
-        let end = self.text(glyphs, TextSize::Large, (text_x, top), look.colour, look.word);
+        self.shape(shape, [pad * 2.0, icon_top, pad * 2.0 + icon, icon_top + icon], colour);
+        let end = self.text(glyphs, TextSize::Large, (text_x, top), colour, word);
         if beside {
             // Both sizes stand on one base line.
             let drop = glyphs.ascent(TextSize::Large) - glyphs.ascent(TextSize::Small);
-            self.text(glyphs, TextSize::Small, (end + 2.0 * pad, top + drop), WHITE, look.cause);
+            self.text(glyphs, TextSize::Small, (end + 2.0 * pad, top + drop), WHITE, cause);
         }
         for (line, n) in below.zip(0_u8..) {
             self.text(glyphs, TextSize::Small, (text_x, top + large + small * f32::from(n)), WHITE, line);

@@ -148,7 +148,7 @@ fn no_two_states_have_shape_and_colour_in_common() {
         Status::NotScored { cause, action },
         Status::Fault { cause, action },
     ];
-    let words: Vec<_> = states.iter().map(|s| look(s).word).collect();
+    let words: Vec<_> = states.iter().map(|s| s.words().word).collect();
     assert_eq!(
         words,
         ["READY", "HIT", "NEUTRAL HIT", "MISS", "NOT CHECKED", "PAUSED", "NOT SCORED", "FAULT"]
