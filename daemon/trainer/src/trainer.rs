@@ -215,7 +215,10 @@ impl Trainer {
                 Request::Load(asked) => self.asked = Some(asked),
             }
         }
-        instructor.tell(now(), || status_of(&self.session, &self.parts));
+        // What waits is known to wait with its first frame.
+        if self.tally.frames() > 0 {
+            instructor.tell(now(), || status_of(&self.session, &self.parts));
+        }
     }
 
     fn is_over(&self, is_dialogue: bool) -> bool {
