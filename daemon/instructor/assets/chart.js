@@ -59,7 +59,7 @@ export class LiveChart {
     }
     // All that swims is in sight until somebody chooses another scale; steps keep it from creeping.
     const far = Math.max(...this.boats.map((boat) => Math.hypot(boat.east_m, boat.north_m)), 80) * 1.15;
-    if (!this.isChosen && (far > this.reach_m || far < this.reach_m / 2)) this.reach_m = far * 1.2;
+    if (!this.isChosen && (far > this.reach_m || far < this.reach_m * 0.6)) this.reach_m = far;
     this.draw();
   }
 

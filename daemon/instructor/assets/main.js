@@ -87,7 +87,8 @@ connection.on("ended", ({ words }) => log(words, "alarm"));
 connection.on("you", ({ name, asks_for_token }) => {
   state.name = name;
   state.asks = asks_for_token;
-  say(by("session"), name === null ? "Log in" : `Log out ${name}`);
+  say(by("session"), name === null ? "Log in" : "Log out");
+  by("session").title = name === null ? "with a token" : `logged in as ${name}`;
   scenarios.load(name !== null);
   enable();
 });

@@ -36,6 +36,47 @@ export function showStatus(status) {
   say(by("shown"), status.message || "nothing");
   showDevices(status.devices);
   showReserve(status.boats);
+  showBoats(status.boats);
+}
+
+/** Boats of the score, by name.
+ * @type {Map<string, any>} */
+let scored = new Map();
+by("boats-head").append(row(["Boat", "Side", "Bearing", "Range m", "Speed kn", "Crew", "Detected s", "Called", "Hits", "State"], true));
+
+/** @param {any} boat @param {any} score @returns {string} */
+function ending(boat, score) {
+  if (boat.in_reserve) return "in reserve";
+  const end = score?.ending ? `${score.ending.replace("_", " ")} at ${shown(score.ended_m)} m` : "";
+  return [boat.swims ? "" : "not on the water", boat.is_struck && !end ? "struck" : "", end].filter(Boolean).join(", ") || "swims";
+}
+
+/** @param {any[]} boats */
+function showBoats(boats) {
+  const rows = boats.map((boat) => {
+    const score = scored.get(boat.name);
+    const range = Math.hypot(boat.east_m, boat.north_m);
+    const bearing = ((Math.atan2(boat.east_m, boat.north_m) * 180) / Math.PI + 360) % 360;
+    const isThere = boat.swims;
+    return [
+      boat.name,
+      `${boat.side === "hostile" ? "\u25b2" : "\u25a0"} ${boat.side}`,
+      isThere ? `${String(Math.round(bearing) % 360).padStart(3, "0")}\u00b0` : "-",
+      isThere ? shown(range) : "-",
+      isThere ? shown(boat.speed_m_s * 1.943844) : "-",
+      boat.crew ?? "-",
+      shown(score?.detected_s, 1),
+      score?.identified_as ?? "-",
+      String(score?.hits ?? "-"),
+      ending(boat, score),
+    ];
+  });
+  const body = by("boats");
+  while (body.children.length > rows.length) body.lastElementChild?.remove();
+  rows.forEach((cells, i) => {
+    const line = body.children[i] ?? body.appendChild(row(cells));
+    cells.forEach((cell, k) => say(/** @type {HTMLElement} */ (line.children[k]), cell));
+  });
 }
 
 /** @param {any[]} devices */
@@ -72,10 +113,10 @@ export function showScore(news) {
   const { score, error, unknown } = news;
   by("score-note").hidden = Boolean(score) && !unknown;
   say(by("score-note"), error ?? (unknown ? `${unknown} events are of a newer version and do not count` : ""));
+  scored = new Map((score?.boats ?? []).map((/** @type {any} */ boat) => [boat.name, boat]));
   if (!score) {
     say(by("points"), "-");
     by("score").replaceChildren();
-    by("boats").replaceChildren();
     return;
   }
   say(by("points"), score.points === null ? "no points" : `${shown(score.points)} of 100`);
@@ -83,20 +124,9 @@ export function showScore(news) {
   by("score").replaceChildren(
     ...score.items.map((/** @type {any} */ item) => row([item.item, `${shown(item.points)} of ${shown(item.of)}`])),
     row(["rounds, hits", `${rounds.fired}, ${rounds.hits}`]),
-    ...(rounds.neutral_hits ? [row(["NEUTRAL boats struck by", `${rounds.neutral_hits} rounds`])] : []),
-    ...(score.breaches.length ? [row(["RULES broken", `${score.breaches.length} times`])] : []),
+    ...(rounds.neutral_hits ? [row(["NEUTRAL boats struck, rounds", String(rounds.neutral_hits)])] : []),
+    ...(score.breaches.length ? [row(["RULES broken, bursts", String(score.breaches.length)])] : []),
     row(["threats stopped, turned away", `${score.stopped} and ${score.turned_away} of ${score.hostile}`]),
     row(["calls in time, late, missing", `${calls.in_time}, ${calls.late}, ${calls.missing} of ${calls.asked}`]),
   );
-  const head = element("thead", "", row(["Boat", "Detected s", "Called", "Hits", "End"], true));
-  const rows = score.boats.map((/** @type {any} */ boat) =>
-    row([
-      `${boat.side === "hostile" ? "\u25b2" : "\u25a0"} ${boat.name}`,
-      shown(boat.detected_s, 1),
-      boat.identified_as ?? "-",
-      String(boat.hits),
-      boat.ending ? `${boat.ending.replace("_", " ")} ${shown(boat.ended_m)} m` : "-",
-    ]),
-  );
-  by("boats").replaceChildren(head, element("tbody", "", ...rows));
 }

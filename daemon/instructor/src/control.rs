@@ -10,7 +10,7 @@ use crate::{
     locked,
 };
 
-/// What everybody is shown of it.
+/// News of it for everybody.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub(crate) struct ControlNews {
     /// Name of the token that has it.

@@ -1,4 +1,4 @@
-//! What every request passes and every answer carries.
+//! Checks that every request passes, and headers that every answer carries.
 
 use std::{
     net::{IpAddr, SocketAddr},

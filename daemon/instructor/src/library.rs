@@ -21,7 +21,7 @@ const LISTED_MAX: usize = 500;
 /// Most bytes of the name of a model's file.
 const MODEL_BYTES_MAX: usize = 200;
 
-/// Where a scenario is from.
+/// Source of a scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Origin {
@@ -225,7 +225,7 @@ fn is_plain_file(name: &str) -> bool {
     !name.is_empty() && name.len() <= MODEL_BYTES_MAX && !name.starts_with('.') && name.chars().all(is_plain)
 }
 
-/// What a text says, or its mistakes.
+/// Content of a text, or its mistakes.
 pub(crate) fn check(text: &str) -> Checked {
     let scenario = match may_start(text, "scenario") {
         Ok(scenario) => scenario,

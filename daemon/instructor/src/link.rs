@@ -27,7 +27,7 @@ const SILENCE_MAX: Duration = Duration::from_secs(5);
 /// Messages that wait for the trainer to take them.
 const WAITING_MAX: usize = 16;
 
-/// How it stands with the trainer.
+/// News of the way to the trainer.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(crate) struct LinkNews {
     /// It is joined.
@@ -40,7 +40,7 @@ pub(crate) struct LinkNews {
 pub(crate) trait Listener: Send + Sync {
     /// It was joined, or lost.
     fn link(&self, news: LinkNews);
-    /// How things are.
+    /// The trainer as it is.
     fn status(&self, status: Status);
     /// Something was refused.
     fn refused(&self, why: String);

@@ -34,6 +34,7 @@ fn page() -> Markup {
                     (chart())
                     (side())
                     (commands())
+                    (boats())
                     (scenarios())
                     (inject())
                     (words())
@@ -104,7 +105,7 @@ fn chart() -> Markup {
                     button type="button" id="chart-in" aria-label="Closer" aria-keyshortcuts="+" { "+" }
                 }
             }
-            canvas id="chart" role="img" aria-label="Chart about the gun, north up: boats, bearing and field of view. The table of boats under Score says the same in words." {}
+            canvas id="chart" role="img" aria-label="Chart about the gun, north up: boats, bearing and field of view. The table of boats says the same in words." {}
             p.muted.legend { "\u{25b2} hostile  \u{25a0} neutral  \u{2715} struck" }
         }
     }
@@ -112,7 +113,7 @@ fn chart() -> Markup {
 
 fn side() -> Markup {
     html! {
-        div.side {
+        div.side tabindex="0" role="region" aria-label="Devices and score" {
             section.panel aria-labelledby="devices-title" {
                 h2 id="devices-title" { "Devices" }
                 ul.devices id="devices" { li.muted { "no news yet" } }
@@ -121,7 +122,6 @@ fn side() -> Markup {
                 div.head { h2 id="score-title" { "Score" } span.badge id="points" { "-" } }
                 p.muted id="score-note" { "no score yet" }
                 table { tbody id="score" {} }
-                div.scroll tabindex="0" role="region" aria-label="Boats" { table id="boats" {} }
             }
         }
     }
@@ -156,8 +156,8 @@ fn commands() -> Markup {
     html! {
         section.panel.commands id="commands" tabindex="-1" aria-label="Commands" {
             (group("Calls of the trainee", &CALLS))
-            (group("Rules of engagement", &RULES))
             (group("Weapon", &WEAPON))
+            (group("Rules of engagement", &RULES))
             div.group role="group" aria-label="Exercise" {
                 span.muted aria-hidden="true" { "Exercise" }
                 div.keys {
@@ -166,6 +166,15 @@ fn commands() -> Markup {
                     button type="button" id="stand-by" { "Stand by" }
                 }
             }
+        }
+    }
+}
+
+fn boats() -> Markup {
+    html! {
+        section.panel.boats aria-labelledby="boats-title" {
+            h2 id="boats-title" { "Boats" }
+            div.scroll tabindex="0" role="region" aria-label="Boats" { table { thead id="boats-head" {} tbody id="boats" {} } }
         }
     }
 }

@@ -16,7 +16,7 @@ use crate::options::{InstructorError, TlsFiles};
 /// Most bytes of a certificate with those that lead to its authority, and of a key.
 const FILE_BYTES_MAX: usize = 1 << 20;
 
-/// What speaks TLS with that certificate.
+/// An acceptor that has that certificate.
 pub(crate) fn acceptor(files: &TlsFiles) -> Result<TlsAcceptor, InstructorError> {
     let pem = read(&files.certificate)?;
     let chain: Vec<CertificateDer<'static>> = CertificateDer::pem_slice_iter(&pem)

@@ -31,7 +31,7 @@ pub struct FakeTrainer {
     thread: Option<JoinHandle<()>>,
 }
 
-/// What it plays.
+/// The exercise that it plays.
 struct State {
     status: Status,
     /// Boats as they began.
