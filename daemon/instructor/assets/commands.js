@@ -116,7 +116,8 @@ export class Commands {
       "?": () => by("help-open").click(),
     };
     const button = /^[A-Z]$/.test(key) ? document.querySelector(`[data-key="${key}"]`) : null;
-    if (button instanceof HTMLElement) button.click();
+    if (button instanceof HTMLButtonElement && button.disabled) log("you have no control: press K first", "alarm");
+    else if (button instanceof HTMLElement) button.click();
     else if (key in others) others[key]();
     else return;
     event.preventDefault();

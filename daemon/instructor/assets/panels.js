@@ -110,9 +110,9 @@ function showReserve(boats) {
 
 /** @param {any} news */
 export function showScore(news) {
-  const { score, error, unknown } = news;
-  by("score-note").hidden = Boolean(score) && !unknown;
-  say(by("score-note"), error ?? (unknown ? `${unknown} events are of a newer version and do not count` : ""));
+  const { score, error, unknown, run, finished } = news;
+  const of = `run ${run}, ${finished ? "ended" : "goes on"}${unknown ? `; ${unknown} events are of a newer version and do not count` : ""}`;
+  say(by("score-note"), error ?? of);
   scored = new Map((score?.boats ?? []).map((/** @type {any} */ boat) => [boat.name, boat]));
   if (!score) {
     say(by("points"), "-");

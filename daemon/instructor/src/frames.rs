@@ -57,16 +57,18 @@ pub(crate) struct Frames {
     /// Browsers that have drawn their last picture and want another.
     waiting: AtomicUsize,
     quality: u8,
+    width_max: u32,
 }
 
 impl Frames {
-    pub(crate) fn new(quality: u8) -> Self {
+    pub(crate) fn new(quality: u8, width_max: u32) -> Self {
         Self {
             slot: Mutex::default(),
             filled: Condvar::new(),
             newest: watch::Sender::new(None),
             waiting: AtomicUsize::new(0),
             quality,
+            width_max,
         }
     }
 
@@ -122,7 +124,7 @@ impl Frames {
                     slot = self.filled.wait(slot).unwrap_or_else(std::sync::PoisonError::into_inner);
                 }
             };
-            match jpeg(&picture, self.quality, &mut rgb) {
+            match jpeg(&picture, self.quality, self.width_max, &mut rgb) {
                 Ok(jpeg) => {
                     let Picture { frame: number, complete_ns, .. } = picture;
                     self.newest.send_replace(Some(Arc::new(Frame { number, complete_ns, jpeg })));
@@ -172,17 +174,43 @@ pub(crate) fn be_nice(by: i32) {
     }
 }
 
-fn jpeg(picture: &Picture, quality: u8, rgb: &mut Vec<u8>) -> image::ImageResult<Vec<u8>> {
+/// The picture as JPEG, made smaller by a whole number where it is too wide.
+fn jpeg(picture: &Picture, quality: u8, width_max: u32, rgb: &mut Vec<u8>) -> image::ImageResult<Vec<u8>> {
+    let by = picture.width.div_ceil(width_max.max(1)).max(1);
+    let (width, height) = ((picture.width / by).max(1), (picture.height / by).max(1));
     rgb.clear();
-    rgb.reserve(picture.rgba.len() / 4 * 3);
-    rgb.extend(picture.rgba.chunks_exact(4).flat_map(|pixel| match pixel {
-        [r, g, b, ..] => [*r, *g, *b],
-        _ => [0; 3],
-    }));
+    rgb.reserve((width * height * 3) as usize);
+    if by == 1 {
+        rgb.extend(picture.rgba.chunks_exact(4).flat_map(|pixel| match pixel {
+            [r, g, b, ..] => [*r, *g, *b],
+            _ => [0; 3],
+        }));
+    } else {
+        smaller(picture, by as usize, (width as usize, height as usize), rgb);
+    }
     let mut jpeg = Vec::with_capacity(rgb.len() / 8);
     let mut encoder = JpegEncoder::new_with_quality(&mut jpeg, quality);
-    encoder.encode(rgb, picture.width, picture.height, ExtendedColorType::Rgb8)?;
+    encoder.encode(rgb, width, height, ExtendedColorType::Rgb8)?;
     Ok(jpeg)
+}
+
+/// Means of squares of `by` times `by` pixels.
+fn smaller(picture: &Picture, by: usize, (width, height): (usize, usize), rgb: &mut Vec<u8>) {
+    let row_bytes = picture.width as usize * 4;
+    let mut sums = vec![[0u32; 3]; width];
+    let count = u32::try_from(by * by).unwrap_or(1);
+    for rows in picture.rgba.chunks(row_bytes * by).take(height) {
+        sums.fill([0; 3]);
+        for row in rows.chunks_exact(row_bytes) {
+            for (sum, square) in sums.iter_mut().zip(row.chunks_exact(4 * by)) {
+                for pixel in square.chunks_exact(4) {
+                    sum.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += u32::from(*value));
+                }
+            }
+        }
+        // A mean of bytes is one.
+        rgb.extend(sums.iter().flatten().map(|sum| (sum / count) as u8));
+    }
 }
 
 #[cfg(test)]
@@ -212,20 +240,39 @@ mod tests {
         let times = 20;
         let mut bytes = 0;
         for _ in 0..times {
-            bytes = jpeg(&picture, 80, &mut rgb).unwrap().len();
+            bytes = jpeg(&picture, 80, 1280, &mut rgb).unwrap().len();
         }
         let each = begun.elapsed() / times;
         println!("1280x720 at quality 80: {:.1} ms, {} kB", each.as_secs_f64() * 1e3, bytes / 1000);
         assert!(each < Duration::from_millis(300));
-        let image = image::load_from_memory(&jpeg(&picture, 80, &mut rgb).unwrap()).unwrap().to_rgb8();
+        let image = image::load_from_memory(&jpeg(&picture, 80, 1280, &mut rgb).unwrap()).unwrap().to_rgb8();
         assert_eq!(image.dimensions(), (1280, 720));
         let near = |a: u8, b: u8| a.abs_diff(b) < 40;
         assert!(near(image.get_pixel(0, 0).0[2], picture.rgba[2]));
     }
 
     #[test]
+    fn a_picture_that_is_too_wide_is_made_smaller() {
+        let picture = picture(1, 101, 61);
+        let mut rgb = Vec::new();
+        for (width_max, size) in [(101, (101, 61)), (100, (50, 30)), (40, (33, 20)), (1, (1, 1))] {
+            let jpeg = jpeg(&picture, 90, width_max, &mut rgb).unwrap();
+            assert_eq!(rgb.len(), size.0 * size.1 * 3);
+            let image = image::load_from_memory(&jpeg).unwrap();
+            assert_eq!((image.width() as usize, image.height() as usize), size);
+        }
+        let grey = Picture { rgba: vec![77; 8 * 6 * 4], width: 8, height: 6, frame: 1, complete_ns: 0 };
+        jpeg(&grey, 90, 4, &mut rgb).unwrap();
+        assert_eq!(rgb, [77; 4 * 3 * 3]);
+        let low = Picture { rgba: vec![9; 5000 * 4], width: 5000, height: 1, frame: 1, complete_ns: 0 };
+        assert!(jpeg(&low, 90, 1280, &mut rgb).is_ok(), "one row");
+        let high = Picture { width: 1, height: 70_000, rgba: vec![9; 70_000 * 4], frame: 1, complete_ns: 0 };
+        assert!(jpeg(&high, 90, 1280, &mut rgb).is_err(), "higher than a JPEG can be");
+    }
+
+    #[test]
     fn pictures_are_asked_for_while_somebody_waits_and_newest_wins() {
-        let frames = Arc::new(Frames::new(80));
+        let frames = Arc::new(Frames::new(80, 1280));
         let now = Instant::now();
         assert!(!frames.asks(now), "nobody watches");
         let mut wish = Wish::new(&frames);

@@ -114,6 +114,7 @@ fn is_own_origin(headers: &HeaderMap, host: &str, is_tls: bool) -> bool {
 #[cfg(test)]
 mod tests {
     use axum::body::Body;
+    use proptest::prelude::*;
 
     use super::*;
 
@@ -176,5 +177,14 @@ mod tests {
             assert!(!ask("POST", &[other], false) && !ask("GET", &[other], false), "{other}");
         }
         assert!(!ask("POST", &[own, "http://evil.example"], false));
+    }
+
+    proptest! {
+        /// Hosts near the own one, and any others.
+        #[test]
+        fn no_other_host_is_own(host in "(10\\.0\\.0\\.1|[a-z.\\[\\]@:%0-9]{0,12}|.{0,12})(:8370|:|\\.|@)?[a-z0-9.:]{0,5}") {
+            let is_own = host == "10.0.0.1:8370" || host == "10.0.0.1:08370" || host.eq_ignore_ascii_case("[::ffff:10.0.0.1]:8370");
+            prop_assert_eq!(is_own_host(&host, ENDS, &[]), is_own, "{}", host);
+        }
     }
 }

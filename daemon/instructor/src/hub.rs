@@ -33,8 +33,6 @@ const NOTICES_MAX: usize = 32;
 const REVIEWS_MAX: usize = 4;
 /// Texts of scenarios that are worked on at one time.
 const TEXTS_MAX: usize = 2;
-/// Control lapses this long after its holder's last page is gone.
-pub(crate) const LAPSES_AFTER: Duration = Duration::from_secs(30);
 
 /// The scenario that was begun last from here.
 type Begun = (String, String);
@@ -68,7 +66,7 @@ impl Hub {
         Self {
             access: Access::new(tokens, options.allow_without_token, options.limits.session),
             control: Control::new(),
-            frames: Frames::new(options.jpeg_quality),
+            frames: Frames::new(options.jpeg_quality, options.picture_width_max),
             library: Library::new(options.library.clone()),
             link: Arc::new(Link::new(options.socket.clone())),
             link_news: watch::Sender::new(news),
@@ -164,7 +162,7 @@ impl Hub {
                 if self.has_page(key) {
                     seen = now;
                 }
-                self.access.holds(key, now) && now.duration_since(seen) < LAPSES_AFTER
+                self.access.holds(key, now) && now.duration_since(seen) < self.options.limits.control_lapses
             });
             if let Some(words) = lapsed {
                 self.notice(&words);
@@ -224,8 +222,9 @@ impl Listener for Hub {
         });
     }
 
-    fn status(&self, status: Status) {
-        *locked(&self.journal) = status.journal.as_ref().map(PathBuf::from);
+    fn status(&self, mut status: Status) {
+        // Where files lie is nothing for everybody who looks on.
+        *locked(&self.journal) = status.journal.take().map(PathBuf::from);
         let shown = json!({"kind": "status", "status": status});
         self.status.send_replace(Some(text(&shown)));
     }

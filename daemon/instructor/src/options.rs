@@ -35,6 +35,8 @@ pub struct Limits {
     pub silence_max: Duration,
     /// Time that a session lasts.
     pub session: Duration,
+    /// Time after which control lapses whose holder has no page open any longer.
+    pub control_lapses: Duration,
 }
 
 impl Default for Limits {
@@ -47,6 +49,7 @@ impl Default for Limits {
             write_timeout: Duration::from_secs(10),
             silence_max: Duration::from_secs(30),
             session: Duration::from_secs(12 * 3600),
+            control_lapses: Duration::from_secs(30),
         }
     }
 }
@@ -72,6 +75,8 @@ pub struct InstructorOptions {
     pub library: Option<PathBuf>,
     /// Most pictures a second, 1 to 30.
     pub picture_rate: f64,
+    /// Greatest width of the pictures, pixels: wider ones are halved, or cut to a third and so on, before they are encoded.
+    pub picture_width_max: u32,
     /// Quality of the pictures, 1 to 100.
     pub jpeg_quality: u8,
     /// Bounds of what clients may take.
@@ -94,6 +99,7 @@ impl InstructorOptions {
             allow_without_token: false,
             library: None,
             picture_rate: 15.0,
+            picture_width_max: 1280,
             jpeg_quality: 80,
             limits: Limits::default(),
         }
@@ -103,6 +109,9 @@ impl InstructorOptions {
     pub(crate) fn check(&self, tokens: usize) -> Result<(), InstructorError> {
         if !(1.0..=30.0).contains(&self.picture_rate) {
             return Err(InstructorError::PictureRate(self.picture_rate));
+        }
+        if !(160..=4096).contains(&self.picture_width_max) {
+            return Err(InstructorError::PictureWidth(self.picture_width_max));
         }
         if !(1..=100).contains(&self.jpeg_quality) {
             return Err(InstructorError::JpegQuality(self.jpeg_quality));
@@ -149,6 +158,9 @@ pub enum InstructorError {
     /// A rate that is none.
     #[error("{0} pictures a second are not allowed: give 1 to 30")]
     PictureRate(f64),
+    /// A width that is none.
+    #[error("a picture's width of {0} is not allowed: give 160 to 4096")]
+    PictureWidth(u32),
     /// A quality that is none.
     #[error("a quality of {0} is not allowed: give 1 to 100")]
     JpegQuality(u8),
@@ -211,6 +223,7 @@ mod tests {
         for rate in [0.0, f64::NAN, 31.0] {
             assert!(InstructorOptions { picture_rate: rate, ..options.clone() }.check(0).is_err());
         }
+        assert!(InstructorOptions { picture_width_max: 0, ..options.clone() }.check(0).is_err());
         assert!(InstructorOptions { jpeg_quality: 0, ..options.clone() }.check(0).is_err());
         for name in ["", "a b", "http://a", "a:80", "a..b", "*"] {
             assert!(

@@ -55,7 +55,7 @@ fn header() -> Markup {
                 h1 id="scenario" { "Bowwave instructor" }
                 p.muted id="clock" { "no exercise" }
             }
-            div.state role="group" aria-label="State of the trainer" {
+            div.state role="status" aria-label="State of the trainer" {
                 span.badge id="word" { "NO NEWS" }
                 span id="cause" {}
             }

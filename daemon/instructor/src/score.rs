@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bowwave_core::text::one_line;
-use bowwave_record::{RunSelection, StoredRun, read_runs};
+use bowwave_record::{JournalError, RunSelection, StoredRun, read_runs};
 use bowwave_review::{ReviewedRun, ScoredRun};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -40,8 +40,17 @@ impl From<StoredRun> for ListedRun {
 
 /// The score of the newest run as `bowwave score --json` prints it, or why there is none.
 pub(crate) fn of_newest(journal: &Path) -> Value {
-    match ScoredRun::read(journal, RunSelection::Latest) {
-        Ok(scored) => json!({"kind": "score", "score": scored.sheet, "unknown": scored.unknown}),
+    let newest = || -> Result<_, JournalError> {
+        let Some(run) = read_runs(journal)?.pop() else { return Ok(None) };
+        let scored = ScoredRun::read(journal, RunSelection::Run(run.id))?;
+        Ok(Some((run, scored)))
+    };
+    match newest() {
+        Ok(Some((run, scored))) => {
+            let (score, unknown) = (scored.sheet, scored.unknown);
+            json!({"kind": "score", "run": run.id, "finished": run.finished, "score": score, "unknown": unknown})
+        }
+        Ok(None) => json!({"kind": "score", "error": "the journal has no run yet"}),
         Err(error) => json!({"kind": "score", "error": error.to_string()}),
     }
 }

@@ -173,6 +173,20 @@ fn a_trainer_that_is_started_again_is_joined_again() {
 }
 
 #[test]
+fn control_lapses_where_its_holder_is_gone() {
+    let server = Server::with(true, |options| options.limits.control_lapses = Duration::from_millis(1500));
+    let mut watcher = server.page(None);
+    let (_, mut anna) = in_control(&server, &server.anna);
+    watcher.wait_for("control", |news| news["holder"] == "anna");
+    std::thread::sleep(Duration::from_secs(3));
+    anna.say(r#"{"kind":"order","order":{"order":"pause"}}"#);
+    anna.wait_for("status", |news| news["status"]["is_paused"] == true);
+    drop(anna);
+    watcher.wait_for("notice", |news| news["words"] == "anna is gone: nobody has control");
+    watcher.wait_for("control", |news| news["holder"].is_null());
+}
+
+#[test]
 fn errors_of_the_journal_are_words() {
     let mut server = Server::with(false, |_| {});
     let journal = server.folder.path().join("missing.sqlite");
