@@ -1,7 +1,8 @@
 // @ts-check
 // Joins time, chart, view, events and tables.
 
-import { Chart, colour, fitted } from "./chart.js";
+import { colour, fitted } from "bowwave/plane";
+import { Chart } from "./chart.js";
 import { Clock } from "./clock.js";
 import { Run } from "./run.js";
 import { drawShots } from "./shots.js";

@@ -2,7 +2,7 @@
 // Plots of aimed misses: about the target, and over time.
 
 import uPlot from "uplot";
-import { colour } from "./chart.js";
+import { colour } from "bowwave/plane";
 
 /** @typedef {import("./run.js").Run} Run */
 

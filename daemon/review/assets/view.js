@@ -3,7 +3,7 @@
 
 import * as THREE from "three";
 import { OrbitControls } from "three/OrbitControls";
-import { colour } from "./chart.js";
+import { colour } from "bowwave/plane";
 import { Run, decoded } from "./run.js";
 
 /** Seconds that a splash and a strike stay. */

@@ -1,6 +1,6 @@
 //! The page of a debrief.
 
-use bowwave_web::{Module, Page, THREE, UPLOT, UPLOT_STYLE};
+use bowwave_web::{Module, PLANE, Page, THREE, UPLOT, UPLOT_STYLE};
 use maud::{Markup, html};
 use serde_json::Value;
 
@@ -34,7 +34,7 @@ pub fn page(run: &ReviewedRun) -> String {
     let text = serde_json::to_string(&data).unwrap_or_default();
     let score = serde_json::to_value(&run.scored).unwrap_or_default();
     let title = format!("{} - run {}", run.stored.run.scenario, run.stored.id);
-    let modules: Vec<Module> = THREE.into_iter().chain([UPLOT]).chain(MODULES).collect();
+    let modules: Vec<Module> = THREE.into_iter().chain([UPLOT, PLANE]).chain(MODULES).collect();
     let style = [UPLOT_STYLE, STYLE].concat();
     let body = body(run, &score, &notes);
     Page { title: &title, style: &style, body, data: &text, modules: &modules, main: "main.js" }.to_html()

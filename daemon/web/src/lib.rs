@@ -24,6 +24,9 @@ pub const THREE: [Module; 3] = [
     Module { name: "three/OrbitControls", source: include_str!("../assets/vendor/three/OrbitControls.js") },
 ];
 
+/// A chart's plane about the gun: scale, rings, bearing, boats with names.
+pub const PLANE: Module = Module { name: "bowwave/plane", source: include_str!("../assets/plane.js") };
+
 /// Plots over time by uPlot.
 pub const UPLOT: Module =
     Module { name: "uplot", source: include_str!("../assets/vendor/uplot/uPlot.esm.js") };
