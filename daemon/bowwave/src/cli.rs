@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod desk;
+mod instructor;
 mod mounting;
 mod phantom;
 mod scenario;
@@ -15,6 +16,7 @@ use hw_sim::fault::{Fault, FaultKind};
 
 pub use calibrate::{Calibrate, CalibrateBoard, CalibrateIntrinsics, CalibrateTask};
 pub use desk::{DeskArgs, Play};
+pub use instructor::{InstructorArgs, InstructorCommand, TokenCommand};
 pub use mounting::{
     CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibrateRestore, CalibrateTrigger,
     CalibrateWizard, CalibrationFiles, InputArgs, OutputArgs, WizardTask,
@@ -68,6 +70,8 @@ pub enum ProgramCommand {
     Score(ScoreArgs),
     /// Make a page on which a run is debriefed: chart, a view that is moved, events, score and rounds in step with one time line
     Review(ReviewArgs),
+    /// Serve the instructor's page on the local network: live picture, chart, devices; start, pause, boats, calls, score and review
+    Instructor(InstructorArgs),
     /// Measure lens, mounting and timing, or print the board for it
     Calibrate(Calibrate),
     /// Print what a shell needs to complete this command line

@@ -13,6 +13,7 @@ mod doctor;
 pub mod ending;
 mod hits;
 mod instructed;
+mod instructor;
 mod laboratory;
 pub mod licences;
 pub mod loading;
@@ -71,6 +72,7 @@ fn dispatch(
         ProgramCommand::Hits(arguments) => hits::run(arguments).map(|()| Outcome::Done),
         ProgramCommand::Score(arguments) => score::run(arguments).map(|()| Outcome::Done),
         ProgramCommand::Review(arguments) => review::run(arguments),
+        ProgramCommand::Instructor(arguments) => instructor::run(arguments),
         ProgramCommand::Calibrate(arguments) => calibrate::run(arguments.task.as_ref()),
         ProgramCommand::Completions(arguments) => completions::run(arguments.shell),
         ProgramCommand::Licences => licences::run(),
