@@ -14,6 +14,10 @@ export class Commands {
     this.connection = connection;
     this.isPaused = false;
     this.hasControl = false;
+    /** @type {string | null} */
+    this.holder = null;
+    /** When somebody else's control was asked for. */
+    this.asked = -CONFIRM;
     document.querySelectorAll("[data-command]").forEach((button) =>
       button.addEventListener("click", () => {
         this.give(button.getAttribute("data-command") ?? "");
@@ -23,7 +27,7 @@ export class Commands {
     by("pause").addEventListener("click", () => this.order({ order: this.isPaused ? "resume" : "pause" }));
     this.confirmed(by("reset"), () => this.give({ kind: "reset" }));
     this.confirmed(by("stand-by"), () => this.give({ kind: "stand_by" }));
-    by("control").addEventListener("click", () => this.give({ kind: this.hasControl ? "hand_back" : "take_control" }));
+    by("control").addEventListener("click", () => this.control());
     this.form("message", (text) => ({ order: "message", text }));
     this.form("note", (text) => ({ order: "note", text }));
     by("inject-form").addEventListener("submit", (event) => {
@@ -31,6 +35,16 @@ export class Commands {
       this.inject();
     });
     document.addEventListener("keydown", (event) => this.key(event));
+  }
+
+  /** Takes control, or hands it back. From somebody else it is taken with the second press. */
+  control() {
+    const now = performance.now();
+    if (this.hasControl) this.give({ kind: "hand_back" });
+    else if (this.holder && now - this.asked > CONFIRM) {
+      this.asked = now;
+      log(`${this.holder} has control: once more within ${CONFIRM / 1000} s takes it over`);
+    } else this.give({ kind: "take_control" });
   }
 
   /** @param {any} command @returns {boolean} */
@@ -50,7 +64,11 @@ export class Commands {
     by(`${id}-form`).addEventListener("submit", (event) => {
       event.preventDefault();
       const field = /** @type {HTMLInputElement} */ (by(id));
-      if (this.order(order(field.value.trim())) && this.hasControl) field.value = "";
+      const text = field.value.trim();
+      if (this.order(order(text)) && this.hasControl) {
+        field.value = "";
+        log(`${id}: ${text}`);
+      }
       field.blur();
     });
   }

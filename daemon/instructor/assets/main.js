@@ -24,6 +24,8 @@ const state = {
   /** @type {string | null} */
   name: null,
   asks: true,
+  /** A session that ends was ended here. */
+  leaves: false,
   number: -1,
   /** When the number rose last. */
   risen: performance.now(),
@@ -75,6 +77,7 @@ connection.on("status", ({ status }) => {
     button.setAttribute("aria-pressed", String(isSet));
   });
   canLoad = status.can_load;
+  say(by("start-note"), canLoad ? "" : "The trainer cannot begin another scenario now.");
   showStrip();
   enable();
 });
@@ -83,9 +86,10 @@ let canLoad = true;
 connection.on("score", showScore);
 connection.on("notice", ({ words }) => log(words));
 connection.on("refused", ({ words }) => log(words, "alarm"));
-connection.on("ended", ({ words }) => log(words, "alarm"));
+connection.on("ended", ({ words }) => state.leaves || log(words, "alarm"));
 connection.on("you", ({ name, asks_for_token }) => {
   state.name = name;
+  state.leaves = false;
   state.asks = asks_for_token;
   say(by("session"), name === null ? "Log in" : "Log out");
   by("session").title = name === null ? "with a token" : `logged in as ${name}`;
@@ -97,6 +101,7 @@ connection.on("control", ({ holder, is_own }) => showControl(holder, is_own));
 /** @param {string | null} holder @param {boolean} isOwn */
 function showControl(holder, isOwn) {
   commands.hasControl = isOwn;
+  commands.holder = holder;
   const words = !connection.isOpen ? "control: not known" : isOwn ? "you have control" : holder ? `${holder} has control` : "nobody has control";
   say(by("holder"), words);
   by("holder").classList.toggle("own", isOwn);
@@ -119,6 +124,7 @@ by("session").addEventListener("click", async () => {
   if (state.name === null && state.asks) open(by("login"));
   else if (state.name === null) await login("");
   else {
+    state.leaves = true;
     await ask("POST", "/logout", "").catch((error) => log(error.message, "alarm"));
     connection.again();
   }

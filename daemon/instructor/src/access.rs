@@ -58,6 +58,8 @@ struct Known {
     tokens: Vec<KnownToken>,
     /// Length, inode and time of the file's last change: what tells another file from this.
     stamp: Option<(u64, u64, i64, i64)>,
+    /// It could not be read; that was logged.
+    failed: bool,
 }
 
 /// Who is let in.
@@ -184,13 +186,16 @@ impl Access {
         if stamp == known.stamp && (stamp.is_some() || known.tokens.is_empty()) {
             return;
         }
-        known.stamp = stamp;
-        known.tokens = file.known().unwrap_or_else(|error| {
-            // Whoever cannot be known is not let in.
+        let read = file.known();
+        if let Some(error) = read.as_ref().err().filter(|_| !known.failed) {
             log::error!("{error}; until then nobody is let in");
-            Vec::new()
-        });
-        if let Some(warning) = file.warning() {
+        }
+        // One that could not be read is read again.
+        known.failed = read.is_err();
+        known.stamp = if known.failed { None } else { stamp };
+        // Whoever cannot be known is not let in.
+        known.tokens = read.unwrap_or_default();
+        if let Some(warning) = file.warning().filter(|_| !known.failed) {
             log::warn!("{warning}");
         }
     }
@@ -236,8 +241,8 @@ impl Failed {
     }
 }
 
-/// An address as tries are counted: whoever has an IPv6 address has 2^64 of them.
-fn neighbourhood(address: IpAddr) -> IpAddr {
+/// An address as tries and connections are counted: whoever has an IPv6 address has 2^64 of them.
+pub(crate) fn neighbourhood(address: IpAddr) -> IpAddr {
     match address {
         IpAddr::V6(v6) => match v6.to_ipv4_mapped() {
             Some(v4) => IpAddr::V4(v4),
@@ -291,7 +296,15 @@ mod tests {
         }
         assert_eq!(access.visitor(&first, now), None);
         assert_eq!(locked(&access.sessions).len(), SESSIONS_MAX);
-        std::fs::remove_file(folder.path().join("tokens")).unwrap();
+        let path = folder.path().join("tokens");
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, "nothing of a token").unwrap();
+        access.tick(now);
+        assert!(locked(&access.sessions).is_empty() && access.asks_for_token());
+        std::fs::write(&path, text).unwrap();
+        access.tick(now);
+        assert!(access.login(&token, HERE, now).is_ok());
+        std::fs::remove_file(path).unwrap();
         access.tick(now);
         assert!(locked(&access.sessions).is_empty() && access.asks_for_token());
     }

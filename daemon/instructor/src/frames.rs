@@ -166,10 +166,10 @@ impl Drop for Wish<'_> {
     }
 }
 
-/// Lets other threads of the computer go first.
-pub(crate) fn be_nice(by: i32) {
-    // On Linux of the calling thread alone.
-    if let Err(error) = rustix::process::nice(by) {
+/// Lets other threads of the computer go first: 0 is the usual niceness, 19 the greatest.
+pub(crate) fn be_nice(niceness: i32) {
+    // On Linux that of the calling thread alone. Threads that it starts begin with it.
+    if let Err(error) = rustix::process::setpriority_process(None, niceness) {
         log::debug!("a thread keeps its priority: {error}");
     }
 }

@@ -10,6 +10,7 @@ use std::{
 };
 
 use axum::extract::ws::Utf8Bytes;
+use bowwave_core::text::one_line;
 use bowwave_link::{Picture, Status, ToDaemon};
 use serde_json::{Value, json};
 use tokio::sync::{Semaphore, broadcast, watch};
@@ -30,7 +31,7 @@ use crate::{
 /// Words for all that wait for a slow browser; it misses older ones.
 const NOTICES_MAX: usize = 32;
 /// Reviews that are made or sent at one time: each holds its page.
-const REVIEWS_MAX: usize = 4;
+const REVIEWS_MAX: usize = 2;
 /// Texts of scenarios that are worked on at one time.
 const TEXTS_MAX: usize = 2;
 
@@ -85,7 +86,7 @@ impl Hub {
 
     /// Shows words to everybody.
     pub(crate) fn notice(&self, words: &str) {
-        log::info!("{words}");
+        log::info!("{}", one_line(words));
         // Nobody may be there.
         let _ = self.notices.send(text(&json!({"kind": "notice", "words": words})));
     }

@@ -201,6 +201,7 @@ fn scenarios() -> Markup {
                     @for (value, name) in [("written", "as written"), ("day", "day"), ("dusk", "dusk"), ("night", "night")] { option value=(value) { (name) } }
                 } }
                 button.strong type="button" id="start" { "Start" }
+                span.muted id="start-note" role="status" {}
                 button type="button" id="edit" aria-expanded="false" aria-controls="editor" { "Edit" }
             }
             div.editor id="editor" hidden {

@@ -24,6 +24,7 @@ use tokio::{
 use tokio_rustls::TlsAcceptor;
 
 use crate::{
+    access::neighbourhood,
     frames::be_nice,
     guard::Ends,
     hub::Hub,
@@ -97,7 +98,7 @@ impl Instructor {
     pub fn serve(self, stop: impl Fn() -> bool) -> Result<(), InstructorError> {
         let runtime = Builder::new_multi_thread()
             .worker_threads(2)
-            .max_blocking_threads(4)
+            .max_blocking_threads(8)
             .thread_name("instructor")
             // The trainer on the same computer comes first.
             .on_thread_start(|| be_nice(5))
@@ -168,6 +169,7 @@ struct Door {
 /// A connection that counts until it is dropped.
 struct Inside {
     door: Arc<Door>,
+    /// The address as it is counted.
     peer: IpAddr,
 }
 
@@ -208,24 +210,28 @@ async fn take(listener: TcpListener, door: Arc<Door>) {
                 continue;
             }
         };
-        let Some(inside) = door.enter(peer.ip().to_canonical()) else {
+        let Some(inside) = door.enter(neighbourhood(peer.ip())) else {
             log::debug!("too many connections: one from {} is refused", peer.ip());
             continue;
         };
         tokio::spawn(async move {
-            if let Err(error) = admit(stream, &inside).await {
-                log::debug!("connection from {}: {error}", inside.peer);
+            if let Err(error) = admit(stream, peer.ip().to_canonical(), &inside).await {
+                log::debug!("connection from {}: {error}", peer.ip());
             }
         });
     }
 }
 
-async fn admit(stream: TcpStream, inside: &Inside) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+async fn admit(
+    stream: TcpStream,
+    peer: IpAddr,
+    inside: &Inside,
+) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
     let Door { limits, router, tls, .. } = &*inside.door;
     stream.set_nodelay(true)?;
     let local = stream.local_addr()?;
     let stream = Impatient::new(stream, limits.write_timeout);
-    let ends = Ends { peer: inside.peer, local, is_tls: tls.is_some() };
+    let ends = Ends { peer, local, is_tls: tls.is_some() };
     match tls {
         None => talk(stream, router.clone(), ends, limits).await?,
         Some(tls) => {

@@ -109,6 +109,8 @@ fn requests_for_other_hosts_or_from_other_pages_are_refused() {
     ] {
         assert!(answer.head.contains(header), "{header} in {}", answer.head);
     }
+    let missing = server.ask("GET", "/nowhere", None, "");
+    assert!(missing.status == 404 && missing.head.contains("content-security-policy"), "{}", missing.head);
     let login = server.ask("POST", "/login", None, &server.anna);
     assert!(
         login.head.contains("httponly; samesite=strict") && login.head.contains("cache-control: no-store")

@@ -6,8 +6,18 @@ mod support;
 
 use std::time::{Duration, Instant};
 
-use bowwave_core::{act::Act, engagement::Engagement, order::Order};
+use bowwave_core::{
+    act::Act,
+    engagement::Engagement,
+    model::Zone,
+    order::Order,
+    side::Side,
+    time::Time,
+    world::score::{Outcome, ShotRecord},
+};
 use bowwave_link::ToDaemon;
+use bowwave_record::{Journal, Run, RunSelection};
+use bowwave_review::ScoredRun;
 use serde_json::json;
 use support::{Page, Server, memory_mb, trainer::FakeTrainer};
 
@@ -203,4 +213,52 @@ fn errors_of_the_journal_are_words() {
         assert!(answer.status == 404 && answer.body.contains("no journal"), "{path} {}", answer.body);
         assert_eq!(server.ask("GET", path, None, "").status, 401);
     }
+}
+
+#[test]
+fn score_runs_and_reviews_are_those_of_the_journal() {
+    let mut server = Server::with(false, |_| {});
+    let path = server.folder.path().join("hits.sqlite");
+    let run = Run { scenario: "first".to_owned(), ..Run::default() };
+    Journal::open(&path, &run).unwrap().finish().unwrap();
+    let run = Run { scenario: "second".to_owned(), ..run };
+    let journal = Journal::open(&path, &run).unwrap();
+    let time = Time::from_ns(5_000_000_000);
+    let (range_m, point) = (300.0, Default::default());
+    let outcome = Outcome::Hit {
+        boat: "skiff".to_owned(),
+        side: Some(Side::Hostile),
+        zone: Zone::Helm,
+        time,
+        range_m,
+        point,
+    };
+    let (muzzle, bore) = (Default::default(), Default::default());
+    let shot = ShotRecord { shot: 1, fired: time, muzzle, bore, pose_age_ns: 0, outcome };
+    journal.shot(&shot).unwrap();
+    server.trainer = Some(FakeTrainer::start(&server.socket, Some(&path)).unwrap());
+    // The trainer still has it open.
+    let mut page = server.page(None);
+    let score = page.wait_for("score", |news| news["score"]["rounds"]["hits"] == 1);
+    let expected = ScoredRun::read(&path, RunSelection::Latest).unwrap();
+    assert_eq!(score["score"], serde_json::to_value(&expected.sheet).unwrap());
+    assert_eq!((score["run"].as_i64(), score["finished"].as_bool()), (Some(2), Some(false)));
+    let status = page.wait("status");
+    assert!(status["status"]["journal"].is_null(), "no path for everybody");
+
+    let cookie = server.login(&server.anna);
+    let runs = server.ask("GET", "/api/runs", Some(&cookie), "").body;
+    let runs: serde_json::Value = serde_json::from_str(&runs).unwrap();
+    let list = runs["runs"].as_array().unwrap();
+    assert_eq!(
+        (list.len(), &list[0]["scenario"], &list[1]["scenario"]),
+        (2, &json!("second"), &json!("first"))
+    );
+    let review = server.ask("GET", "/review/2", Some(&cookie), "");
+    assert!(review.status == 200 && review.body.contains("<title>second - run 2</title>"));
+    assert!(review.head.contains("content-security-policy: sandbox allow-scripts; default-src 'none'"));
+    let missing = server.ask("GET", "/review/3", Some(&cookie), "");
+    assert!(missing.status == 404 && missing.body.contains('3'), "{}", missing.body);
+    journal.finish().unwrap();
+    page.wait_for("score", |news| news["finished"] == true);
 }
