@@ -70,7 +70,7 @@ pub enum FromDaemon {
 /// The trainer at one time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Status {
-    /// Counts its statuses since the program began: one that does not rise is old.
+    /// Counts the statuses of a connection: one that does not rise is old.
     pub number: u64,
     /// `CLOCK_MONOTONIC`, nanoseconds.
     pub time_ns: i64,

@@ -64,6 +64,9 @@ pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
     let listen = |socket: &PathBuf| instructed::listen(socket, scenarios.clone(), sea);
     let mut port = arguments.instructor.as_ref().map(listen).transpose()?;
     // Making a sea is ended at once by an interrupt, so these are caught once the first one is made.
+    if let Some(port) = &port {
+        port.prepare("THE SEA OF THE SCENARIO IS MADE");
+    }
     let mut interrupts = None;
     let mut is_first = true;
     let seat = PlayerSeat { arguments, aimer, config, program_start };
@@ -73,6 +76,9 @@ pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
         let scenario = playing.loaded.scenario.clone();
         let finished = seat.play(playing, instruction, &mut interrupts)?;
         is_first = false;
+        if let Some(port) = &port {
+            port.prepare("ANOTHER SCENARIO BEGINS");
+        }
         if let Ended::Reload { cause: ReloadCause::Asked(asked), .. } = &finished.ended {
             let mut loaded = instructed::load(asked, &scenarios)?;
             if asked.is_stand_by {

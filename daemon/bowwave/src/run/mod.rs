@@ -100,6 +100,9 @@ pub fn run(arguments: &RunArgs, program_start: Time) -> Result<Outcome> {
             }
             Ended::Reload { lcd, cause } => {
                 lcd_size = lcd;
+                if let Some(Joined { port, .. }) = &instructor {
+                    port.prepare("ANOTHER RUN BEGINS");
+                }
                 match cause {
                     ReloadCause::Asked(asked) => reader.asked = Some(asked),
                     // Whoever has the settings read again wants what is configured.
@@ -131,7 +134,10 @@ fn join_instructor(joined: &mut Option<Joined>, settings: &mut Settings, data: &
     *joined = None;
     let Some(socket) = &wanted.socket else { return };
     match instructed::listen(socket, instructed::scenarios(&settings.config, Some(data)), |_| Ok(())) {
-        Ok(port) => *joined = Some(Joined { settings: wanted.clone(), port }),
+        Ok(port) => {
+            port.prepare("THE TRAINER STARTS");
+            *joined = Some(Joined { settings: wanted.clone(), port });
+        }
         Err(e) => {
             let why = format!("{e:#}; no instructor can join");
             settings.faults.push(FaultChange::raised(now(), Fault::Config, why));

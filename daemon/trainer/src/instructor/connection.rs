@@ -10,7 +10,7 @@ use std::{
         atomic::{AtomicBool, Ordering},
     },
     thread::{self, JoinHandle},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use bowwave_core::world::scenario;
@@ -27,6 +27,8 @@ const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
 const HELLO_TIMEOUT: Duration = Duration::from_secs(5);
 /// How often the writing thread looks for something to write while nothing wakes it.
 const PATIENCE: Duration = Duration::from_millis(20);
+/// How often what the trainer prepares is said.
+const PREPARING_EVERY: Duration = Duration::from_millis(500);
 /// Refusals that wait; more would say the same.
 const REFUSALS: usize = 16;
 
@@ -42,6 +44,8 @@ pub(super) struct Mail {
 #[derive(Debug, Default)]
 struct Waiting {
     status: Option<Box<Status>>,
+    /// Stands for a status each second while the loop does not run.
+    preparing: Option<Box<Status>>,
     refusals: VecDeque<String>,
     pictures: bool,
 }
@@ -58,6 +62,11 @@ impl Mail {
             waiting.status = Some(Box::new(status));
             self.there.notify_one();
         }
+    }
+
+    /// Has a status stand for those of a loop that does not run yet.
+    pub(super) fn put_preparing(&self, status: Option<Status>) {
+        self.waiting().preparing = status.map(Box::new);
     }
 
     /// Adds a refusal. The lock is held for moments only.
@@ -81,7 +90,8 @@ impl Mail {
     }
 
     fn clear(&self) {
-        *self.waiting() = Waiting::default();
+        let mut waiting = self.waiting();
+        *waiting = Waiting { preparing: waiting.preparing.take(), ..Waiting::default() };
     }
 
     fn waiting(&self) -> MutexGuard<'_, Waiting> {
@@ -245,7 +255,7 @@ fn stand_by() -> AskedScenario {
 fn write(mut stream: &UnixStream, serving: &Serving, has_ended: &AtomicBool) -> Result<(), LinkError> {
     let mail = &serving.mail;
     write_from_daemon(&mut stream, FromDaemon::Hello(Hello::new(env!("CARGO_PKG_VERSION"))))?;
-    let mut awaits_picture = false;
+    let (mut awaits_picture, mut number, mut said) = (false, 0, Instant::now());
     while !has_ended.load(Ordering::Acquire) && !mail.is_closed.load(Ordering::Relaxed) {
         let (status, refusals) = {
             let waiting = mail.waiting();
@@ -255,12 +265,17 @@ fn write(mut stream: &UnixStream, serving: &Serving, has_ended: &AtomicBool) -> 
             let waited = mail.there.wait_timeout_while(waiting, patience, is_idle);
             let mut waiting = waited.unwrap_or_else(PoisonError::into_inner).0;
             awaits_picture |= std::mem::take(&mut waiting.pictures);
-            (waiting.status.take(), std::mem::take(&mut waiting.refusals))
+            let status = waiting.status.take();
+            let preparing = || waiting.preparing.clone().filter(|_| said.elapsed() >= PREPARING_EVERY);
+            let status = status.or_else(preparing);
+            (status, std::mem::take(&mut waiting.refusals))
         };
         for why in refusals {
             write_from_daemon(&mut stream, FromDaemon::Refused(why))?;
         }
-        if let Some(status) = status {
+        if let Some(mut status) = status {
+            number += 1;
+            (status.number, said) = (number, Instant::now());
             write_from_daemon(&mut stream, FromDaemon::Status(status))?;
         }
         if awaits_picture && let Some(picture) = serving.tap.take(PATIENCE) {

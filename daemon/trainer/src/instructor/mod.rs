@@ -81,7 +81,6 @@ pub struct InstructorPort {
     thread: Option<JoinHandle<()>>,
     can_load: bool,
     told: Option<Time>,
-    number: u64,
     session: u64,
     is_stand_by: bool,
     journal: Option<String>,
@@ -117,11 +116,17 @@ impl InstructorPort {
             thread: Some(thread),
             can_load,
             told: None,
-            number: 0,
             session: 0,
             is_stand_by: false,
             journal: None,
         })
+    }
+
+    /// What takes a while before the next session begins, in a few words: the instructor is shown that instead of a status.
+    pub fn prepare(&self, what: &str) {
+        let word = "GETTING READY".to_owned();
+        let can_load = false;
+        self.mail.put_preparing(Some(Status { word, cause: what.to_owned(), can_load, ..Status::default() }));
     }
 
     /// Another session begins. Its rounds go to that journal.
@@ -154,9 +159,8 @@ impl InstructorPort {
             return;
         }
         self.told = Some(now);
-        self.number += 1;
+        self.mail.put_preparing(None);
         self.mail.put_status(Status {
-            number: self.number,
             session: self.session,
             stands_by: self.is_stand_by,
             can_load: self.can_load,

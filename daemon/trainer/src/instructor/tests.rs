@@ -183,3 +183,23 @@ fn a_socket_that_was_left_is_replaced_and_nothing_else_is() {
     drop(first);
     assert!(!socket.exists());
 }
+
+#[test]
+fn whoever_joins_before_a_session_begins_is_shown_what_is_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut port = port(&folder);
+    port.prepare("THE SEA IS MADE");
+    let mut stream = connect(&folder);
+    let mut next = || loop {
+        if let FromDaemon::Status(status) = read_from_daemon(&mut stream).unwrap() {
+            return status;
+        }
+    };
+    let (first, second) = (next(), next());
+    assert_eq!((first.word.as_str(), first.cause.as_str()), ("GETTING READY", "THE SEA IS MADE"));
+    assert!(second.number > first.number);
+    port.begin_session(None, false);
+    port.tell(now(), || Status { word: "READY".to_owned(), ..Status::default() });
+    let third = next();
+    assert!(third.word == "READY" && third.number > second.number, "{third:?}");
+}
