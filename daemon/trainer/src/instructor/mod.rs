@@ -184,7 +184,7 @@ impl Drop for InstructorPort {
 
 /// What connections need.
 #[derive(Clone)]
-pub(self) struct Serving {
+struct Serving {
     requests: Sender<Request>,
     mail: Arc<Mail>,
     tap: Arc<PictureTap>,

@@ -1,4 +1,4 @@
-use bowwave_core::fault::Severity;
+use bowwave_core::{fault::Severity, model::Zone};
 use proptest::prelude::*;
 
 use super::*;
