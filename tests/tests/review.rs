@@ -8,6 +8,7 @@
 )]
 
 mod browser;
+mod reviewed;
 
 use std::{
     collections::BTreeMap,

@@ -313,6 +313,8 @@ pub struct ScoreArgs {
 pub enum ReviewFormat {
     /// A page that needs no other file
     Html,
+    /// The same page on paper, printed by Chromium, Chrome or Edge
+    Pdf,
     /// Everything that happened, and where everything was, a row each
     Csv,
     /// The same, a JSON object a line
@@ -321,19 +323,35 @@ pub enum ReviewFormat {
     Acmi,
 }
 
+impl ReviewFormat {
+    /// Name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Html => "html",
+            Self::Pdf => "pdf",
+            Self::Csv => "csv",
+            Self::Jsonl => "jsonl",
+            Self::Acmi => "acmi",
+        }
+    }
+}
+
 /// Arguments of `review`.
 #[derive(Debug, Args)]
 pub struct ReviewArgs {
-    /// Journal (SQLite) or the folder that a run left
+    /// Journals (SQLite) or folders that runs left; several are compared on one page
     #[arg(default_value = "bowwave-out")]
-    pub run: PathBuf,
-    /// This run of the journal; without it the newest
-    #[arg(long = "run", value_name = "N")]
-    pub number: Option<i64>,
+    pub run: Vec<PathBuf>,
+    /// This run of the journal, or these, which are compared; without it the newest
+    #[arg(long = "run", value_name = "N,N,...", value_delimiter = ',')]
+    pub numbers: Vec<i64>,
+    /// Compare all runs of the journals
+    #[arg(long, conflicts_with = "numbers")]
+    pub all_runs: bool,
     /// A page for the browser, or rows and tracks for other programs
     #[arg(long, value_enum, default_value_t = ReviewFormat::Html)]
     pub format: ReviewFormat,
-    /// The file to write; without it review-N.FORMAT beside the journal
+    /// The file to write; without it review-N.FORMAT beside the journal, or review-compare.FORMAT beside the first
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Replace what is at --out

@@ -5,6 +5,7 @@ import { Chart, colour, fitted } from "./chart.js";
 import { Clock } from "./clock.js";
 import { Run } from "./run.js";
 import { drawShots } from "./shots.js";
+import { followTheme } from "./theme.js";
 import { View } from "./view.js";
 
 /** @template {HTMLElement} T @param {string} id @returns {T} */
@@ -177,10 +178,7 @@ function dress() {
   drawShots(by("group"), by("errors"), run);
   draw();
 }
-by("theme").addEventListener("change", (event) => {
-  if (event.target instanceof HTMLSelectElement) document.documentElement.dataset.obcTheme = event.target.value;
-  dress();
-});
+followTheme(dress);
 window.addEventListener("resize", dress);
 dress();
 performance.mark("interactive");

@@ -1,10 +1,12 @@
-//! The debrief of a run, from its journal: [`ReviewedRun`] reads it, [`page`] makes one HTML file of it, [`export`]
-//! what other programs read.
+//! The debrief of a run, from its journal: [`ReviewedRun`] reads it, [`page`] makes one HTML file of it, [`compare`]
+//! one of several runs, [`export`] what other programs read.
 //!
 //! Every number on the page is the journal's or the score's; nothing is computed here that the score defines.
 
 #![forbid(unsafe_code)]
 
+mod cells;
+pub mod compare;
 mod data;
 pub mod export;
 mod meshes;

@@ -6,16 +6,17 @@ use serde_json::Value;
 
 use crate::{data, run::ReviewedRun, tables};
 
-const STYLE: &str = include_str!("../assets/review.css");
+const STYLE: &str = concat!(include_str!("../assets/page.css"), include_str!("../assets/review.css"));
 
 /// The page's own modules.
-const MODULES: [Module; 6] = [
+const MODULES: [Module; 7] = [
     Module { name: "main.js", source: include_str!("../assets/main.js") },
     Module { name: "run.js", source: include_str!("../assets/run.js") },
     Module { name: "clock.js", source: include_str!("../assets/clock.js") },
     Module { name: "chart.js", source: include_str!("../assets/chart.js") },
     Module { name: "view.js", source: include_str!("../assets/view.js") },
     Module { name: "shots.js", source: include_str!("../assets/shots.js") },
+    Module { name: "theme.js", source: include_str!("../assets/theme.js") },
 ];
 
 /// The page of `run`, one file that needs no other.
@@ -96,12 +97,19 @@ fn header(run: &ReviewedRun, score: &Value) -> Markup {
                 Some(points) => { span.badge { (format!("{points:.0} of 100 points")) } }
                 None => { span.badge { "no points: no events were kept" } }
             }
-            label.screen-only { "Light " select id="theme" {
-                @for (value, name) in [("day", "Day"), ("bright", "Bright"), ("dusk", "Dusk"), ("night", "Night")] {
-                    option value=(value) { (name) }
-                }
-            } }
+            (light())
         }
+    }
+}
+
+/// The choice of a palette.
+pub fn light() -> Markup {
+    html! {
+        label.screen-only { "Light " select id="theme" {
+            @for (value, name) in [("day", "Day"), ("bright", "Bright"), ("dusk", "Dusk"), ("night", "Night")] {
+                option value=(value) { (name) }
+            }
+        } }
     }
 }
 

@@ -1,5 +1,8 @@
 //! `bowwave review`: the debrief of a run as a page, and what other programs read of it.
 
+mod address;
+mod compare;
+
 use std::{
     path::{Path, PathBuf},
     process::{Command, Stdio},
@@ -8,6 +11,7 @@ use std::{
 use anyhow::{Context, Result};
 use bowwave_review::{ReviewedRun, export, page};
 
+use self::compare::Comparison;
 use crate::{
     cli::{ReviewArgs, ReviewFormat},
     hits::journal_at,
@@ -18,39 +22,45 @@ use crate::{
 
 /// Makes the page, says where it is, and opens it where that is wanted.
 pub fn run(arguments: &ReviewArgs) -> Result<Outcome> {
-    let journal = journal_at(&arguments.run)?;
-    let reviewed = ReviewedRun::read(&journal, arguments.number)?;
     if let Some(out) = &arguments.out {
         refuse_to_replace(out, arguments.force)?;
     }
+    if let Some(Comparison { text, path, is_whole }) = compare::compared(arguments)? {
+        return finish(arguments, &path, &text, is_whole);
+    }
+    let journal = journal_at(arguments.run.first().context("no run is named")?)?;
+    let reviewed = ReviewedRun::read(&journal, arguments.numbers.first().copied())?;
     let place = || beside(&journal, reviewed.stored.id, arguments.format);
     let path = arguments.out.clone().unwrap_or_else(place);
     let text = match arguments.format {
-        ReviewFormat::Html => page(&reviewed),
+        ReviewFormat::Html | ReviewFormat::Pdf => page(&reviewed),
         ReviewFormat::Csv => export::csv(&reviewed),
         ReviewFormat::Jsonl => export::json_lines(&reviewed),
         ReviewFormat::Acmi => export::acmi(&reviewed),
     };
-    write_new(&path, &text)?;
+    // What is missing is said on the page, too.
+    let is_whole = reviewed.tracks.missing == 0 && reviewed.scored.unknown == 0;
+    finish(arguments, &path, &text, is_whole)
+}
+
+/// Writes what was made, says where it is, and opens it where that is wanted.
+fn finish(arguments: &ReviewArgs, path: &Path, text: &str, is_whole: bool) -> Result<Outcome> {
+    write_new(path, text)?;
     stdout::print(format!("{}\n", path.display()))?;
     if arguments.open {
-        open(&path)?;
+        open(path)?;
     } else if arguments.format == ReviewFormat::Html {
         eprintln!("open it in a browser; it needs no other file and no network");
     }
-    // What is missing is said on the page, too.
-    let is_whole = reviewed.tracks.missing == 0 && reviewed.scored.unknown == 0;
     Ok(if is_whole { Outcome::Done } else { Outcome::Partly })
 }
 
 /// The file's place where none is named: in the journal's folder, one a run and format.
 fn beside(journal: &Path, run: i64, format: ReviewFormat) -> PathBuf {
     let end = match format {
-        ReviewFormat::Html => "html",
-        ReviewFormat::Csv => "csv",
-        ReviewFormat::Jsonl => "jsonl",
         // As Tacview knows its texts.
         ReviewFormat::Acmi => "txt.acmi",
+        other => other.name(),
     };
     journal.with_file_name(format!("review-{run}.{end}"))
 }

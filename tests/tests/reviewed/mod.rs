@@ -1,0 +1,3 @@
+//! Further parts of the debrief, each with its tests.
+
+mod compare;
