@@ -111,6 +111,7 @@ fn reviewed() -> &'static Reviewed {
                 &script,
                 "--fast",
                 "--headless",
+                "--video",
                 "--camera",
                 "320x180",
                 "--size",

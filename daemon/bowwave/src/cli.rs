@@ -4,6 +4,7 @@ mod calibrate;
 mod desk;
 mod mounting;
 mod phantom;
+mod review;
 mod scenario;
 
 use std::{ffi::OsString, path::PathBuf};
@@ -20,6 +21,7 @@ pub use mounting::{
     CalibrateWizard, CalibrationFiles, InputArgs, OutputArgs, WizardTask,
 };
 pub use phantom::{CalibratePhantom, TracedOutline};
+pub use review::{ReviewArgs, ReviewFormat};
 pub use scenario::{
     ScenarioArgs, ScenarioCheck, ScenarioCommand, ScenarioList, ScenarioNew, ScenarioPreview,
 };
@@ -306,60 +308,6 @@ pub struct ScoreArgs {
     /// Print as JSON
     #[arg(long)]
     pub json: bool,
-}
-
-/// Formats of `review`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ReviewFormat {
-    /// A page that needs no other file
-    Html,
-    /// The same page on paper, printed by Chromium, Chrome or Edge
-    Pdf,
-    /// Everything that happened, and where everything was, a row each
-    Csv,
-    /// The same, a JSON object a line
-    Jsonl,
-    /// A flight recording of text (ACMI 2.2), which Tacview opens
-    Acmi,
-}
-
-impl ReviewFormat {
-    /// Name on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Html => "html",
-            Self::Pdf => "pdf",
-            Self::Csv => "csv",
-            Self::Jsonl => "jsonl",
-            Self::Acmi => "acmi",
-        }
-    }
-}
-
-/// Arguments of `review`.
-#[derive(Debug, Args)]
-pub struct ReviewArgs {
-    /// Journals (SQLite) or folders that runs left; several are compared on one page
-    #[arg(default_value = "bowwave-out")]
-    pub run: Vec<PathBuf>,
-    /// This run of the journal, or these, which are compared; without it the newest
-    #[arg(long = "run", value_name = "N,N,...", value_delimiter = ',')]
-    pub numbers: Vec<i64>,
-    /// Compare all runs of the journals
-    #[arg(long, conflicts_with = "numbers")]
-    pub all_runs: bool,
-    /// A page for the browser, or rows and tracks for other programs
-    #[arg(long, value_enum, default_value_t = ReviewFormat::Html)]
-    pub format: ReviewFormat,
-    /// The file to write; without it review-N.FORMAT beside the journal, or review-compare.FORMAT beside the first
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-    /// Replace what is at --out
-    #[arg(long, requires = "out")]
-    pub force: bool,
-    /// Open the file on the desktop: the page in the browser
-    #[arg(long)]
-    pub open: bool,
 }
 
 /// `imu-freeze@2.5+0.5`.

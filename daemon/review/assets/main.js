@@ -3,6 +3,7 @@
 
 import { Chart, colour, fitted } from "./chart.js";
 import { Clock } from "./clock.js";
+import { Film } from "./film.js";
 import { Run } from "./run.js";
 import { drawShots } from "./shots.js";
 import { followTheme } from "./theme.js";
@@ -182,5 +183,11 @@ followTheme(dress);
 window.addEventListener("resize", dress);
 dress();
 performance.mark("interactive");
+/** @type {Film | null} */
+let film = null;
+if (run.video !== null) {
+  film = new Film(/** @type {HTMLVideoElement} */ (by("video")), by("video-note"), run.video, clock);
+  film.illustrate(document.querySelectorAll("#rounds tr"));
+}
 // Tests and those who look into the page find the run here.
-Object.assign(window, { bowwave: { run, clock, chart, view } });
+Object.assign(window, { bowwave: { run, clock, chart, view, film } });

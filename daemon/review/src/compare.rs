@@ -33,7 +33,7 @@ pub struct ComparedRun {
     stored: StoredRun,
     details: RunDetails,
     scored: ScoredRun,
-    /// Wall time of its beginning, or that of its neighbour in the journal where the clock was not set.
+    /// Wall time that it is put in order by.
     around_ns: Option<i64>,
 }
 
@@ -82,10 +82,11 @@ impl ComparedRun {
     }
 }
 
-/// Wall time of a run's beginning; that of the nearest earlier run of the journal, else of the next, where its own is not known.
+/// Wall time of a run's beginning, to be put in order by: the latest that the journal has up to this run, since it is kept in order while clocks
+/// jump; else that of the next run whose clock was set.
 fn around(all: &[StoredRun], at: usize) -> Option<i64> {
     let wall = |stored: &StoredRun| stored.run.started_wall_ns;
-    all[..=at].iter().rev().find_map(wall).or_else(|| all[at..].iter().find_map(wall))
+    all[..=at].iter().filter_map(wall).max().or_else(|| all[at..].iter().find_map(wall))
 }
 
 /// Numbers of all runs of the journal at `path`.
@@ -125,7 +126,16 @@ pub fn compare_page(runs: &[ComparedRun]) -> String {
         }
     };
     let title = format!("{} runs compared", runs.len());
-    Page { title: &title, style: STYLE, body, data: "{}", modules: &MODULES, main: "compare.js" }.to_html()
+    Page {
+        title: &title,
+        style: STYLE,
+        body,
+        data: "{}",
+        modules: &MODULES,
+        main: "compare.js",
+        plays_files: false,
+    }
+    .to_html()
 }
 
 /// All runs, each with its mark, and where its own page is.

@@ -8,14 +8,18 @@
 mod cells;
 pub mod compare;
 mod data;
+mod document;
 pub mod export;
 mod meshes;
 mod page;
 mod run;
 mod scored;
 mod tables;
+mod video;
 mod words;
 
+pub use document::Document;
 pub use page::page;
 pub use run::ReviewedRun;
 pub use scored::{ExplainedRound, ScoredRun};
+pub use video::{RunVideo, VideoError, VideoPlace, VideoTimes};

@@ -11,8 +11,8 @@ use crate::{
     words::{self, Weight},
 };
 
-/// All tables.
-pub fn all(run: &ReviewedRun, score: &Value) -> Markup {
+/// All tables. Where there is a video, each round has a picture of it.
+pub fn all(run: &ReviewedRun, score: &Value, has_video: bool) -> Markup {
     let cells = Cells::of(score);
     html! {
         div.tables {
@@ -23,7 +23,7 @@ pub fn all(run: &ReviewedRun, score: &Value) -> Markup {
             (summary(&cells))
             (group(run))
             (boats(&cells))
-            (rounds(run, score))
+            (rounds(run, score, has_video))
         }
     }
 }
@@ -218,7 +218,7 @@ fn group(run: &ReviewedRun) -> Markup {
     }
 }
 
-fn rounds(run: &ReviewedRun, score: &Value) -> Markup {
+fn rounds(run: &ReviewedRun, score: &Value, has_video: bool) -> Markup {
     let cells = Cells::of(score);
     html! {
         section.panel.wide {
@@ -226,6 +226,7 @@ fn rounds(run: &ReviewedRun, score: &Value) -> Markup {
             p.muted { "A round's errors are to the right and over, at the target." }
             div.scroll.long tabindex="0" { table {
                 thead { tr {
+                    @if has_video { th.screen-only { "Picture" } }
                     th.number { "Round" } th.number { "Fired, s" } th { "Outcome" } th.number { "Range, m" }
                     th.number { "Right, m" } th.number { "Over, m" } th.number { "Right, mrad" } th.number { "Over, mrad" } th { "Cause" }
                 } }
@@ -236,6 +237,7 @@ fn rounds(run: &ReviewedRun, score: &Value) -> Markup {
                         @let (weight, words) = words::round(record, found.map(|(_, round)| round));
                         @let fired_s = run.seconds(record.fired.ns());
                         tr data-time=(fired_s) data-shot=(record.shot) {
+                            @if has_video { td.screen-only { canvas.moment width="144" height="81" role="img" aria-label={ "Picture as round " (record.shot) " was fired" } {} } }
                             td.number { (record.shot) }
                             td.number { (format!("{fired_s:.2}")) }
                             td { (badge(&record.outcome, weight)) " " (words) }

@@ -50,15 +50,18 @@ fn each_number_of_several_runs_is_that_of_their_scores() {
     let other = folder.path().join("hits.sqlite");
     append(&other, "<First>", None, 3);
     append(&other, "Second", Some(1_000_000_000_000_000_000), 5);
+    // Its clock was set back.
+    append(&other, "Third", Some(900_000_000_000_000_000), 4);
     let (one, other) = (run.page.parent().unwrap().to_str().unwrap(), other.to_str().unwrap());
     let path = folder.path().join("several.html");
     let made = bowwave(["review", other, one, "--all-runs", "--out", path.to_str().unwrap()]);
     expect_code(&made, 0);
     let page = fs::read_to_string(&path).unwrap();
-    // The clock of the first was not set: its journal's next run stands for it, and both are of 2001.
-    let scores = [score(other, "1"), score(other, "2"), run.score.clone()];
+    // The clock of the first was not set: its journal's next run stands for it.
+    let scores = [score(other, "1"), score(other, "2"), score(other, "3"), run.score.clone()];
     assert!(page.find("&lt;First&gt;</td>") < page.find("Second</td>"), "their order");
-    assert!(page.find("Second</td>") < page.find("One hulk</td>"), "their order");
+    assert!(page.find("Second</td>") < page.find("Third</td>"), "their order");
+    assert!(page.find("Third</td>") < page.find("One hulk</td>"), "their order");
     let shown = cells(&page);
     assert!(shown.len() > 60, "{}", shown.len());
     for (run, pointer, value, text) in &shown {

@@ -19,6 +19,16 @@ pub fn address(from: &Path, to: &Path) -> Option<String> {
     Some(parts?.join("/"))
 }
 
+/// Address of a file on this computer.
+pub fn file_url(path: &Path) -> Option<String> {
+    let parts: Option<Vec<String>> = path
+        .components()
+        .filter(|part| *part != Component::RootDir)
+        .map(|part| part.as_os_str().to_str().map(escaped))
+        .collect();
+    Some(format!("file:///{}", parts?.join("/")))
+}
+
 /// A name as part of an address: bytes that mean something there, or that are no ASCII, as %XX.
 fn escaped(name: &str) -> String {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
@@ -41,5 +51,6 @@ mod tests {
         assert_eq!(address(&page, &one.join("video.mp4")).as_deref(), Some("video.mp4"));
         assert_eq!(address(&page, &two.join("video.mp4")).as_deref(), Some("../a%20%232/video.mp4"));
         assert_eq!(address(&page, &two.join("none.mp4")), None);
+        assert_eq!(file_url(Path::new("/a #2/b.html")).as_deref(), Some("file:///a%20%232/b.html"));
     }
 }

@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
-use bowwave_review::compare::{ComparedRun, compare_page, in_order, run_numbers};
+use bowwave_review::{
+    Document,
+    compare::{ComparedRun, compare_page, in_order, run_numbers},
+};
 
 use super::{address::address, beside};
 use crate::{
@@ -16,10 +19,10 @@ const RUNS_MOST: usize = 60;
 /// File's name where none is given.
 const NAME: &str = "review-compare";
 
-/// The page of the runs that the arguments name, where they name several: its text, its place, and whether all events count.
+/// The page of several runs.
 pub struct Comparison {
     /// The page.
-    pub text: String,
+    pub page: Document,
     /// Its place.
     pub path: PathBuf,
     /// No event is of a newer version.
@@ -36,6 +39,11 @@ pub fn compared(arguments: &ReviewArgs) -> Result<Option<Comparison>> {
         matches!(arguments.format, ReviewFormat::Html | ReviewFormat::Pdf),
         "--format {} is of one run, and {} are named; leave the others out, or make the page",
         arguments.format.name(),
+        wanted.len()
+    );
+    ensure!(
+        arguments.video.is_none() && arguments.video_at.is_none(),
+        "--video is of one run, and {} are named; leave the others out",
         wanted.len()
     );
     ensure!(
@@ -57,7 +65,7 @@ pub fn compared(arguments: &ReviewArgs) -> Result<Option<Comparison>> {
     }
     in_order(&mut runs);
     let is_whole = runs.iter().all(ComparedRun::counts_all_events);
-    Ok(Some(Comparison { text: compare_page(&runs), path, is_whole }))
+    Ok(Some(Comparison { page: Document::new(compare_page(&runs), None), path, is_whole }))
 }
 
 /// Journals with numbers of runs in them, each once.

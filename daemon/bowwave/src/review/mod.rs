@@ -2,6 +2,8 @@
 
 mod address;
 mod compare;
+mod paper;
+mod video;
 
 use std::{
     path::{Path, PathBuf},
@@ -9,7 +11,7 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use bowwave_review::{ReviewedRun, export, page};
+use bowwave_review::{Document, ReviewedRun, compare::run_numbers, export, page};
 
 use self::compare::Comparison;
 use crate::{
@@ -20,37 +22,59 @@ use crate::{
     stdout,
 };
 
+/// Remedies for a run whose place on the Earth is not known.
+const NO_PLACE: &str = "the run's place on the Earth is not known; add --place LAT,LON, or give latitude_deg, longitude_deg and utc in [light] of its \
+                        scenario before it is played";
+
 /// Makes the page, says where it is, and opens it where that is wanted.
 pub fn run(arguments: &ReviewArgs) -> Result<Outcome> {
     if let Some(out) = &arguments.out {
         refuse_to_replace(out, arguments.force)?;
     }
-    if let Some(Comparison { text, path, is_whole }) = compare::compared(arguments)? {
-        return finish(arguments, &path, &text, is_whole);
+    if let Some(Comparison { page, path, is_whole }) = compare::compared(arguments)? {
+        write_page(arguments, &page, &path)?;
+        return finish(arguments, &path, is_whole);
     }
     let journal = journal_at(arguments.run.first().context("no run is named")?)?;
-    let reviewed = ReviewedRun::read(&journal, arguments.numbers.first().copied())?;
-    let place = || beside(&journal, reviewed.stored.id, arguments.format);
-    let path = arguments.out.clone().unwrap_or_else(place);
-    let text = match arguments.format {
-        ReviewFormat::Html | ReviewFormat::Pdf => page(&reviewed),
-        ReviewFormat::Csv => export::csv(&reviewed),
-        ReviewFormat::Jsonl => export::json_lines(&reviewed),
-        ReviewFormat::Acmi => export::acmi(&reviewed),
-    };
+    let mut reviewed = ReviewedRun::read(&journal, arguments.numbers.first().copied())?;
+    reviewed.place = arguments.place.or(reviewed.place);
+    let path =
+        arguments.out.clone().unwrap_or_else(|| beside(&journal, reviewed.stored.id, arguments.format));
+    match arguments.format {
+        ReviewFormat::Html => {
+            let is_newest = run_numbers(&journal)?.last() == Some(&reviewed.stored.id);
+            let video = video::video_for(arguments, (&journal, &reviewed, is_newest), &path)?;
+            write_page(arguments, &page(&reviewed, video.as_ref()), &path)?;
+            video.iter().for_each(|video| eprintln!("{}", video::words(video)));
+        }
+        ReviewFormat::Pdf => write_page(arguments, &page(&reviewed, None), &path)?,
+        ReviewFormat::Csv => write_new(&path, &export::csv(&reviewed))?,
+        ReviewFormat::Jsonl => write_new(&path, &export::json_lines(&reviewed))?,
+        ReviewFormat::Acmi => write_new(&path, &export::acmi(&reviewed))?,
+        ReviewFormat::Geojson => write_new(&path, &export::geojson(&reviewed).context(NO_PLACE)?)?,
+    }
     // What is missing is said on the page, too.
     let is_whole = reviewed.tracks.missing == 0 && reviewed.scored.unknown == 0;
-    finish(arguments, &path, &text, is_whole)
+    finish(arguments, &path, is_whole)
 }
 
-/// Writes what was made, says where it is, and opens it where that is wanted.
-fn finish(arguments: &ReviewArgs, path: &Path, text: &str, is_whole: bool) -> Result<Outcome> {
-    write_new(path, text)?;
+/// Writes a page, or prints it.
+fn write_page(arguments: &ReviewArgs, page: &Document, path: &Path) -> Result<()> {
+    if arguments.format == ReviewFormat::Pdf {
+        return paper::print(page, path, arguments.browser.as_deref());
+    }
+    let cannot =
+        || format!("cannot write {}; check the folder, its permissions and the disk", path.display());
+    page.write(path).with_context(cannot)
+}
+
+/// Says where the file is, and opens it where that is wanted.
+fn finish(arguments: &ReviewArgs, path: &Path, is_whole: bool) -> Result<Outcome> {
     stdout::print(format!("{}\n", path.display()))?;
     if arguments.open {
         open(path)?;
     } else if arguments.format == ReviewFormat::Html {
-        eprintln!("open it in a browser; it needs no other file and no network");
+        eprintln!("open it in a browser; it needs no network");
     }
     Ok(if is_whole { Outcome::Done } else { Outcome::Partly })
 }

@@ -117,13 +117,16 @@ fn names(scores: &[Value], list: &str, key: &str) -> Vec<String> {
 
 /// The table.
 pub fn table(runs: &[ComparedRun], scores: &[Value]) -> Markup {
+    /// Runs beside which paper has no room for meanings.
+    const MANY: usize = 7;
+    let many = (runs.len() >= MANY).then_some("many");
     let [points, summary, causes] = [points(scores), summary(scores), causes(scores)];
     html! {
         section.panel {
             h2 { "Score" }
             p.muted { (POINTS) }
             p.muted { "A dash: the score has no such item, since the scenario does not ask for it, there was none, or it is not known. The numbers are those of " code { "bowwave score --json" } "." }
-            div.scroll tabindex="0" role="region" aria-label="Score of each run" { table.scores {
+            div.scroll tabindex="0" role="region" aria-label="Score of each run" { table.scores style={ "--runs:" (runs.len()) } {
                 thead { tr {
                     th scope="col" { "Item" }
                     @for (i, run) in runs.iter().enumerate() {
@@ -133,13 +136,13 @@ pub fn table(runs: &[ComparedRun], scores: &[Value]) -> Markup {
                             br; small { (run.stored.run.scenario) }
                         }
                     }
-                    th scope="col" { "Meaning" }
+                    th scope="col" class=[many] { "Meaning" }
                 } }
                 @for (title, rows) in [("Points", &points), ("Exercise", &summary), ("Misses by their largest cause", &causes)] {
                     @if !rows.is_empty() {
                         tbody {
                             tr.group { th scope="rowgroup" colspan=(runs.len() + 2) { (title) } }
-                            @for row in rows { (line(row, scores)) }
+                            @for row in rows { (line(row, scores, many)) }
                         }
                     }
                 }
@@ -148,7 +151,7 @@ pub fn table(runs: &[ComparedRun], scores: &[Value]) -> Markup {
     }
 }
 
-fn line(row: &Row, scores: &[Value]) -> Markup {
+fn line(row: &Row, scores: &[Value], many: Option<&str>) -> Markup {
     html! {
         tr {
             th scope="row" { (row.name) }
@@ -158,7 +161,7 @@ fn line(row: &Row, scores: &[Value]) -> Markup {
                     None => td.number { "-" },
                 }
             }
-            td.muted { (row.meaning) }
+            td class=(format!("muted {}", many.unwrap_or_default())) { (row.meaning) }
         }
     }
 }
