@@ -109,10 +109,11 @@ pub fn in_order(runs: &mut [ComparedRun]) {
 pub fn compare_page(runs: &[ComparedRun]) -> String {
     let scores: Vec<Value> =
         runs.iter().map(|run| serde_json::to_value(&run.scored).unwrap_or_default()).collect();
+    let title = if runs.len() == 1 { "1 run".to_owned() } else { format!("{} runs compared", runs.len()) };
     let notes = differences::notes(runs);
     let body = html! {
         header.bar {
-            h1.grow { (runs.len()) " runs compared" }
+            h1.grow { (title) }
             (light())
         }
         main {
@@ -125,7 +126,6 @@ pub fn compare_page(runs: &[ComparedRun]) -> String {
             (progress::plots(runs, &scores))
         }
     };
-    let title = format!("{} runs compared", runs.len());
     Page {
         title: &title,
         style: STYLE,

@@ -7,6 +7,7 @@ use std::{
 };
 
 use base64::{engine::general_purpose::STANDARD, write::EncoderWriter};
+use bowwave_files::plain_file;
 
 /// The element that holds a video's bytes.
 pub const VIDEO_ELEMENT: &str = "<script type=\"text/plain\" id=\"video-data\">";
@@ -36,7 +37,7 @@ impl Document {
                 let (before, after) = self.text.split_at(place);
                 file.write_all(before.as_bytes())?;
                 let mut coder = EncoderWriter::new(&mut file, &STANDARD);
-                io::copy(&mut File::open(video)?, &mut coder)?;
+                io::copy(&mut plain_file(video)?, &mut coder)?;
                 coder.finish()?;
                 drop(coder);
                 file.write_all(after.as_bytes())?;

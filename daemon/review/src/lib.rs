@@ -22,4 +22,4 @@ pub use document::Document;
 pub use page::page;
 pub use run::ReviewedRun;
 pub use scored::{ExplainedRound, ScoredRun};
-pub use video::{RunVideo, VideoError, VideoPlace, VideoTimes};
+pub use video::{RunVideo, VIDEO, VideoError, VideoPlace, VideoTimes};

@@ -209,7 +209,7 @@ fn group(run: &ReviewedRun) -> Markup {
         return html! {};
     }
     html! {
-        section.panel {
+        section.panel.group {
             h2 { "Rounds about the target" }
             p.muted { "As the shooter saw it: to the right and over are positive. Misses that were aimed, and their error over the run." }
             div.plot id="group" role="img" aria-label="Misses about the target, metres to the right and over. The same numbers are in the table of rounds." {}

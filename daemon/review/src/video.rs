@@ -1,14 +1,17 @@
 //! The video of a run, as the display showed it, and the times that its frames show.
 
 use std::{
-    fs::File,
     io::{ErrorKind, Read as _},
     path::{Path, PathBuf},
 };
 
+use bowwave_files::{plain_file, plain_text};
 use serde::{Deserialize, Serialize};
 
 use crate::run::ReviewedRun;
+
+/// Name of the video that a run makes in its folder.
+pub const VIDEO: &str = "video.mp4";
 
 /// A video that cannot be shown.
 #[derive(Debug, thiserror::Error)]
@@ -91,22 +94,20 @@ impl RunVideo {
     /// Where there is no MP4 file that can be read.
     pub fn open(path: &Path, run: &ReviewedRun) -> Result<Self, VideoError> {
         let unreadable = |source| VideoError::Unreadable { path: path.into(), source };
-        let mut file = File::open(path).map_err(unreadable)?;
-        let about = file.metadata().map_err(unreadable)?;
+        let mut file = plain_file(path).map_err(unreadable)?;
+        let bytes = file.metadata().map_err(unreadable)?.len();
         let mut head = [0; 12];
-        let is_video = about.is_file()
-            && match file.read_exact(&mut head) {
-                // The first box of every MP4 file says what it is.
-                Ok(()) => &head[4..8] == b"ftyp",
-                Err(e) if e.kind() == ErrorKind::UnexpectedEof => false,
-                Err(e) => return Err(unreadable(e)),
-            };
+        let is_video = match file.read_exact(&mut head) {
+            // The first box of every MP4 file says what it is.
+            Ok(()) => &head[4..8] == b"ftyp",
+            Err(e) if e.kind() == ErrorKind::UnexpectedEof => false,
+            Err(e) => return Err(unreadable(e)),
+        };
         if !is_video {
             return Err(VideoError::NoVideo { path: path.into() });
         }
-        let times =
-            kept(&path.with_file_name("summary.json"), run).map_or(VideoTimes::Assumed, VideoTimes::Kept);
-        Ok(Self { path: path.to_owned(), bytes: about.len(), place: VideoPlace::Embedded, times })
+        let times = kept(path, run).map_or(VideoTimes::Assumed, VideoTimes::Kept);
+        Ok(Self { path: path.to_owned(), bytes, place: VideoPlace::Embedded, times })
     }
 
     /// The video for the page's scripts.
@@ -145,14 +146,17 @@ impl RunVideo {
     }
 }
 
-/// Times of frames that a summary keeps, where it is of `run`: a folder's summary is that of the last run there.
-fn kept(summary: &Path, run: &ReviewedRun) -> Option<Vec<(u64, i64)>> {
+/// Times of a video's frames that the summary beside it keeps, where it is of `run`: a folder's summary is that of the last run there.
+fn kept(video: &Path, run: &ReviewedRun) -> Option<Vec<(u64, i64)>> {
     /// A video begins and ends within this of its run's tracks and events.
     const NEAR_NS: i64 = 5_000_000_000;
     /// No summary is larger.
-    const BYTES_MOST: u64 = 64 << 20;
-    let mut text = String::new();
-    File::open(summary).ok()?.take(BYTES_MOST).read_to_string(&mut text).ok()?;
+    const BYTES_MOST: usize = 64 << 20;
+    // A summary is that of the video that its run made, and of no other in the folder.
+    if video.file_name()? != VIDEO {
+        return None;
+    }
+    let text = plain_text(&video.with_file_name("summary.json"), BYTES_MOST).ok()?;
     let VideoSummary { scenario, seed, video_frames } = serde_json::from_str(&text).ok()?;
     let marks = video_frames.filter(|marks| !marks.is_empty())?;
     let span = run.begin_ns().saturating_sub(NEAR_NS)..=run.end_ns().saturating_add(NEAR_NS);

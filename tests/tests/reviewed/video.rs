@@ -159,6 +159,14 @@ fn what_is_no_video_is_refused_and_a_recording_leads_to_one() {
         expect_code(&refused, 1);
         assert!(said(&refused).contains(words), "{}", said(&refused));
     }
+    // A pipe without a writer is not waited for, and no page replaces its video.
+    let pipe = folder.path().join("pipe.mp4");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    expect_code(&bowwave(["review", journal, "--video", pipe.to_str().unwrap()]), 1);
+    let video = run.page.with_file_name("video.mp4");
+    let over = bowwave(["review", journal, "--out", video.to_str().unwrap(), "--force"]);
+    expect_code(&over, 1);
+    assert!(said(&over).contains("would replace its video"), "{}", said(&over));
     let copy = folder.path().join("hits.sqlite");
     fs::copy(run.page.with_file_name("hits.sqlite"), &copy).unwrap();
     // One that is beside the journal by chance only leaves the page without a video.

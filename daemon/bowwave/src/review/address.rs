@@ -29,6 +29,11 @@ pub fn file_url(path: &Path) -> Option<String> {
     Some(format!("file:///{}", parts?.join("/")))
 }
 
+/// Tests whether two paths lead to one file.
+pub fn same_file(one: &Path, other: &Path) -> bool {
+    one == other || matches!((one.canonicalize(), other.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
 /// A name as part of an address: bytes that mean something there, or that are no ASCII, as %XX.
 fn escaped(name: &str) -> String {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);

@@ -8,7 +8,10 @@ use bowwave_review::{
     compare::{ComparedRun, compare_page, in_order, run_numbers},
 };
 
-use super::{address::address, beside};
+use super::{
+    address::{address, same_file},
+    beside,
+};
 use crate::{
     cli::{ReviewArgs, ReviewFormat},
     hits::journal_at,
@@ -97,10 +100,6 @@ fn wanted(arguments: &ReviewArgs) -> Result<Vec<(PathBuf, i64)>> {
         }
     }
     Ok(wanted)
-}
-
-fn same_file(one: &Path, other: &Path) -> bool {
-    one == other || matches!((one.canonicalize(), other.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// Address of a run's own page as seen from the page at `from`, where there is one.

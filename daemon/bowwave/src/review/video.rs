@@ -5,14 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use anyhow::{Context, Result};
-use bowwave_review::{ReviewedRun, RunVideo, VideoPlace, VideoTimes};
+use anyhow::{Context, Result, ensure};
+use bowwave_review::{ReviewedRun, RunVideo, VIDEO, VideoPlace, VideoTimes};
 
-use super::address::address;
+use super::address::{address, same_file};
 use crate::cli::ReviewArgs;
-
-/// Name of a run's video in its folder.
-const NAME: &str = "video.mp4";
 
 /// The video for the page at `page`, where there is one. A run is the journal's newest, or it is not.
 pub fn video_for(
@@ -20,7 +17,7 @@ pub fn video_for(
     (journal, run, is_newest): (&Path, &ReviewedRun, bool),
     page: &Path,
 ) -> Result<Option<RunVideo>> {
-    let beside = journal.with_file_name(NAME);
+    let beside = journal.with_file_name(VIDEO);
     let found = match &arguments.video {
         Some(named) => Some(RunVideo::open(named, run)?),
         None if !beside.is_file() => {
@@ -37,6 +34,11 @@ pub fn video_for(
         None => RunVideo::open(&beside, run).map_err(|e| log::warn!("{e}; the page goes without it")).ok(),
     };
     let Some(mut video) = found else { return Ok(None) };
+    ensure!(
+        !same_file(&video.path, page),
+        "the page would replace its video {}; name another file with --out",
+        page.display()
+    );
     if let Some(from_s) = arguments.video_at {
         video.times = VideoTimes::Given(from_s);
     }
@@ -78,7 +80,7 @@ fn hint(journal: &Path, run: &ReviewedRun) {
         run.stored.run.seed,
         quoted(&made),
         quoted(journal),
-        quoted(&made.join(NAME))
+        quoted(&made.join(VIDEO))
     );
 }
 

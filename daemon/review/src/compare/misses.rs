@@ -21,7 +21,7 @@ pub fn plot(runs: &[ComparedRun]) -> Markup {
     // A few that went far off must not hide how the others lie.
     let reach = 1.3 * usual.max(2.0);
     html! {
-        section.panel {
+        section.panel.keep {
             h2 { "Misses about the target" }
             p.muted { "As the shooter saw it: to the right and over are positive. Misses that were aimed, of all runs that are ticked. The plot reaches "
                 (format!("{reach:.1} m")) " from the target; rounds farther off are counted beside their run." }

@@ -1,4 +1,4 @@
-//! How each main item of the score went from run to run.
+//! Progress: each main item of the score from run to run.
 
 use maud::{Markup, html};
 use serde_json::Value;
