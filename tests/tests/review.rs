@@ -8,6 +8,7 @@
 )]
 
 mod browser;
+mod reviewed;
 
 use std::{
     collections::BTreeMap,
@@ -110,6 +111,7 @@ fn reviewed() -> &'static Reviewed {
                 &script,
                 "--fast",
                 "--headless",
+                "--video",
                 "--camera",
                 "320x180",
                 "--size",

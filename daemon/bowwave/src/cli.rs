@@ -5,6 +5,7 @@ mod desk;
 mod instructor;
 mod mounting;
 mod phantom;
+mod review;
 mod scenario;
 
 use std::{ffi::OsString, path::PathBuf};
@@ -22,6 +23,7 @@ pub use mounting::{
     CalibrateWizard, CalibrationFiles, InputArgs, OutputArgs, WizardTask,
 };
 pub use phantom::{CalibratePhantom, TracedOutline};
+pub use review::{ReviewArgs, ReviewFormat};
 pub use scenario::{
     ScenarioArgs, ScenarioCheck, ScenarioCommand, ScenarioList, ScenarioNew, ScenarioPreview,
 };
@@ -310,42 +312,6 @@ pub struct ScoreArgs {
     /// Print as JSON
     #[arg(long)]
     pub json: bool,
-}
-
-/// Formats of `review`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ReviewFormat {
-    /// A page that needs no other file
-    Html,
-    /// Everything that happened, and where everything was, a row each
-    Csv,
-    /// The same, a JSON object a line
-    Jsonl,
-    /// A flight recording of text (ACMI 2.2), which Tacview opens
-    Acmi,
-}
-
-/// Arguments of `review`.
-#[derive(Debug, Args)]
-pub struct ReviewArgs {
-    /// Journal (SQLite) or the folder that a run left
-    #[arg(default_value = "bowwave-out")]
-    pub run: PathBuf,
-    /// This run of the journal; without it the newest
-    #[arg(long = "run", value_name = "N")]
-    pub number: Option<i64>,
-    /// A page for the browser, or rows and tracks for other programs
-    #[arg(long, value_enum, default_value_t = ReviewFormat::Html)]
-    pub format: ReviewFormat,
-    /// The file to write; without it review-N.FORMAT beside the journal
-    #[arg(long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-    /// Replace what is at --out
-    #[arg(long, requires = "out")]
-    pub force: bool,
-    /// Open the file on the desktop: the page in the browser
-    #[arg(long)]
-    pub open: bool,
 }
 
 /// `imu-freeze@2.5+0.5`.

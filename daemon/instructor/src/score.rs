@@ -65,5 +65,5 @@ pub(crate) fn runs(journal: &Path) -> Result<Value, String> {
 /// The page of a run.
 pub(crate) fn review(journal: &Path, run: i64) -> Result<String, String> {
     let reviewed = ReviewedRun::read(journal, Some(run)).map_err(|error| error.to_string())?;
-    Ok(bowwave_review::page(&reviewed))
+    Ok(bowwave_review::page(&reviewed, None).into_text())
 }

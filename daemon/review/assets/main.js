@@ -4,8 +4,10 @@
 import { colour, fitted } from "bowwave/plane";
 import { Chart } from "./chart.js";
 import { Clock } from "./clock.js";
+import { Film } from "./film.js";
 import { Run } from "./run.js";
 import { drawShots } from "./shots.js";
+import { followTheme } from "./theme.js";
 import { View } from "./view.js";
 
 /** @template {HTMLElement} T @param {string} id @returns {T} */
@@ -178,12 +180,15 @@ function dress() {
   drawShots(by("group"), by("errors"), run);
   draw();
 }
-by("theme").addEventListener("change", (event) => {
-  if (event.target instanceof HTMLSelectElement) document.documentElement.dataset.obcTheme = event.target.value;
-  dress();
-});
+followTheme(dress);
 window.addEventListener("resize", dress);
 dress();
 performance.mark("interactive");
+/** @type {Film | null} */
+let film = null;
+if (run.video !== null) {
+  film = new Film(/** @type {HTMLVideoElement} */ (by("video")), by("video-note"), run.video, clock);
+  film.illustrate(document.querySelectorAll("#rounds tr"));
+}
 // Tests and those who look into the page find the run here.
-Object.assign(window, { bowwave: { run, clock, chart, view } });
+Object.assign(window, { bowwave: { run, clock, chart, view, film } });

@@ -9,7 +9,8 @@
  *   path: string}} CodedRound
  * @typedef {{time_s: number, weight: string, words: string, boat: number | null}} RunEvent
  * @typedef {{end_s: number, boats: Boat[], camera: Camera, keep_off_m: number, eye_height_m: number,
- *   tracks: {time_s: string, camera: string, boats: string}, rounds: CodedRound[], events: RunEvent[], meshes: Record<string, CodedMesh>}} PageData
+ *   tracks: {time_s: string, camera: string, boats: string}, rounds: CodedRound[], events: RunEvent[], meshes: Record<string, CodedMesh>,
+ *   video: import("./film.js").Coded | null}} PageData
  * @typedef {{position: number[], attitude: number[]}} Pose  Place (east, north, up) in metres; rotation to the world x, y, z, w.
  */
 
@@ -107,6 +108,7 @@ export class Run {
     this.keep_off_m = data.keep_off_m;
     this.eye_height_m = data.eye_height_m;
     this.meshes = data.meshes;
+    this.video = data.video;
     this.events = data.events;
     this.rounds = data.rounds.map((coded) => new Round(coded));
     this.times = new Float64Array(decoded(data.tracks.time_s));

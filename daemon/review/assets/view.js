@@ -8,6 +8,8 @@ import { Run, decoded } from "./run.js";
 
 /** Seconds that a splash and a strike stay. */
 const SPLASH = 2;
+/** Tracers that are closer to the viewpoint are not drawn, metres. */
+const TRACER_NEAR = 8;
 /** Rounds in the air or splashing that are drawn at a time. */
 const ROUNDS_MOST = 64;
 
@@ -206,7 +208,8 @@ export class View {
         const from = new THREE.Vector3(...(round.at(Math.max(time_s - 1 / 60, round.fired_s)) ?? at));
         const to = new THREE.Vector3(...at);
         const length = Math.max(from.distanceTo(to), 0.5);
-        line.visible = true;
+        // One that has just left the barrel would cover the gun's own view.
+        line.visible = to.distanceTo(this.camera.position) > TRACER_NEAR;
         line.scale.set(1, length, 1);
         line.position.copy(from).lerp(to, 0.5);
         line.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), to.sub(from).normalize());

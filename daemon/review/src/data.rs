@@ -12,6 +12,7 @@ use serde::Serialize;
 use crate::{
     meshes::{self, Mesh, base64_of},
     run::ReviewedRun,
+    video::{PageVideo, RunVideo},
     words::{self, Weight},
 };
 
@@ -27,6 +28,7 @@ pub struct PageData<'a> {
     rounds: Vec<PageRound>,
     events: Vec<PageEvent>,
     meshes: BTreeMap<&'a str, Mesh>,
+    video: Option<PageVideo<'a>>,
 }
 
 /// Samples: arrays in base64 of little-endian numbers. NaN where there is none.
@@ -63,8 +65,8 @@ struct PageEvent {
     boat: Option<usize>,
 }
 
-/// The data of `run`, and what there is to say of it.
-pub fn of(run: &ReviewedRun) -> (PageData<'_>, Vec<String>) {
+/// The data of `run` and its video, and what there is to say of it.
+pub fn of<'a>(run: &'a ReviewedRun, video: Option<&'a RunVideo>) -> (PageData<'a>, Vec<String>) {
     let RunDetails { boats, camera, keep_off_m, eye_height_m, .. } = &run.details;
     let (meshes, notes) = meshes::of_boats(boats, Path::new(&run.details.models_base));
     let data = PageData {
@@ -77,6 +79,7 @@ pub fn of(run: &ReviewedRun) -> (PageData<'_>, Vec<String>) {
         rounds: rounds(run),
         events: events(run),
         meshes,
+        video: video.map(|video| video.for_page(run)),
     };
     (data, notes)
 }

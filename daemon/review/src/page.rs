@@ -1,26 +1,35 @@
 //! The page of a debrief.
 
 use bowwave_web::{Module, PLANE, Page, THREE, UPLOT, UPLOT_STYLE};
-use maud::{Markup, html};
+use maud::{Markup, PreEscaped, html};
 use serde_json::Value;
 
-use crate::{data, run::ReviewedRun, tables};
+use crate::{
+    data,
+    document::{Document, VIDEO_ELEMENT},
+    run::ReviewedRun,
+    tables,
+    video::{RunVideo, VideoPlace},
+};
 
-const STYLE: &str = include_str!("../assets/review.css");
+const STYLE: &str = concat!(include_str!("../assets/page.css"), include_str!("../assets/review.css"));
 
 /// The page's own modules.
-const MODULES: [Module; 6] = [
+const MODULES: [Module; 8] = [
     Module { name: "main.js", source: include_str!("../assets/main.js") },
     Module { name: "run.js", source: include_str!("../assets/run.js") },
     Module { name: "clock.js", source: include_str!("../assets/clock.js") },
     Module { name: "chart.js", source: include_str!("../assets/chart.js") },
     Module { name: "view.js", source: include_str!("../assets/view.js") },
     Module { name: "shots.js", source: include_str!("../assets/shots.js") },
+    Module { name: "film.js", source: include_str!("../assets/film.js") },
+    Module { name: "theme.js", source: include_str!("../assets/theme.js") },
 ];
 
-/// The page of `run`, one file that needs no other.
-pub fn page(run: &ReviewedRun) -> String {
-    let (data, mut notes) = data::of(run);
+/// The page of `run` and of its video, one file that needs no other but a video that is not embedded.
+pub fn page(run: &ReviewedRun, video: Option<&RunVideo>) -> Document {
+    let (data, mut notes) = data::of(run, video);
+    notes.extend(video.iter().flat_map(|video| video.notes()));
     notes.extend(track_notes(run));
     if run.scored.unknown > 0 {
         notes.push(format!("{} events are of a newer version and do not count", run.scored.unknown));
@@ -36,8 +45,19 @@ pub fn page(run: &ReviewedRun) -> String {
     let title = format!("{} - run {}", run.stored.run.scenario, run.stored.id);
     let modules: Vec<Module> = THREE.into_iter().chain([UPLOT, PLANE]).chain(MODULES).collect();
     let style = [UPLOT_STYLE, STYLE].concat();
-    let body = body(run, &score, &notes);
-    Page { title: &title, style: &style, body, data: &text, modules: &modules, main: "main.js" }.to_html()
+    let body = body(run, video, &score, &notes);
+    let embedded = video.filter(|video| video.place == VideoPlace::Embedded).map(|video| video.path.clone());
+    let plays_files = video.is_some() && embedded.is_none();
+    let page = Page {
+        title: &title,
+        style: &style,
+        body,
+        data: &text,
+        modules: &modules,
+        main: "main.js",
+        plays_files,
+    };
+    Document::new(page.to_html(), embedded)
 }
 
 /// Notes on tracks that are missing.
@@ -68,7 +88,7 @@ fn track_notes(run: &ReviewedRun) -> Vec<String> {
     notes
 }
 
-fn body(run: &ReviewedRun, score: &Value, notes: &[String]) -> Markup {
+fn body(run: &ReviewedRun, video: Option<&RunVideo>, score: &Value, notes: &[String]) -> Markup {
     html! {
         (header(run, score))
         main {
@@ -76,14 +96,16 @@ fn body(run: &ReviewedRun, score: &Value, notes: &[String]) -> Markup {
                 section.panel.notes aria-label="Notes" { ul { @for note in notes { li { (note) } } } }
             }
             noscript { p.panel { "Chart and view need JavaScript. The tables do not." } }
-            div.stage.screen-only {
+            div class=(if video.is_some() { "stage screen-only with-video" } else { "stage screen-only" }) {
+                @if video.is_some() { (film()) }
                 (view(run))
                 (chart())
                 (happenings())
             }
-            (tables::all(run, score))
+            (tables::all(run, score, video.is_some()))
         }
         (time_line())
+        @if video.is_some_and(|video| video.place == VideoPlace::Embedded) { (PreEscaped(VIDEO_ELEMENT)) (PreEscaped("</script>")) }
     }
 }
 
@@ -96,11 +118,31 @@ fn header(run: &ReviewedRun, score: &Value) -> Markup {
                 Some(points) => { span.badge { (format!("{points:.0} of 100 points")) } }
                 None => { span.badge { "no points: no events were kept" } }
             }
-            label.screen-only { "Light " select id="theme" {
-                @for (value, name) in [("day", "Day"), ("bright", "Bright"), ("dusk", "Dusk"), ("night", "Night")] {
-                    option value=(value) { (name) }
-                }
-            } }
+            (light())
+        }
+    }
+}
+
+/// The choice of a palette.
+pub fn light() -> Markup {
+    html! {
+        label.screen-only { "Light " select id="theme" {
+            @for (value, name) in [("day", "Day"), ("bright", "Bright"), ("dusk", "Dusk"), ("night", "Night")] {
+                option value=(value) { (name) }
+            }
+        } }
+    }
+}
+
+fn film() -> Markup {
+    html! {
+        section.panel.film aria-labelledby="video-title" {
+            h2 id="video-title" { "Video" }
+            div.frame {
+                video id="video" muted playsinline preload="auto" aria-label="The picture that the trainee's display showed at the time of the time line" {}
+                p id="video-note" role="status" {}
+            }
+            p.muted { "The trainee's display, in step with the time line. Virtual boats and rounds are where they were when the picture was taken." }
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use bowwave_core::ephemeris::Place;
 use bowwave_record::{
     JournalError, RunDetails, RunSelection, StoredRun, StoredTracks, read_runs, read_tracks,
 };
@@ -21,6 +22,8 @@ pub struct ReviewedRun {
     pub tracks: StoredTracks,
     /// Score, rounds and events.
     pub scored: ScoredRun,
+    /// Place of the gun on the Earth, where it is known: the scenario's.
+    pub place: Option<Place>,
 }
 
 impl ReviewedRun {
@@ -44,7 +47,8 @@ impl ReviewedRun {
         let details = kept.and_then(RunDetails::from_json);
         let has_unreadable_details = kept.is_some() && details.is_none();
         let details = details.unwrap_or_default();
-        Ok(Self { stored, details, has_unreadable_details, tracks, scored })
+        let place = details.place_deg.and_then(|[latitude, longitude]| Place::new(latitude, longitude));
+        Ok(Self { stored, details, has_unreadable_details, tracks, scored, place })
     }
 
     /// The run's beginning on the session's clock, nanoseconds: its first sample, else its first event or round.

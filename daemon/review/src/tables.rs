@@ -1,18 +1,19 @@
 //! The tables of the page. Each number of the score is in a cell that names its place in the score's JSON.
 
-use bowwave_core::{text::one_line, world::score::Outcome};
+use bowwave_core::world::score::Outcome;
 use bowwave_record::RunDetails;
 use maud::{Markup, html};
 use serde_json::Value;
 
 use crate::{
+    cells::{Cells, POINTS, SUMMARY},
     run::ReviewedRun,
     words::{self, Weight},
 };
 
-/// All tables.
-pub fn all(run: &ReviewedRun, score: &Value) -> Markup {
-    let cells = Cells { score };
+/// All tables. Where there is a video, each round has a picture of it.
+pub fn all(run: &ReviewedRun, score: &Value, has_video: bool) -> Markup {
+    let cells = Cells::of(score);
     html! {
         div.tables {
             (circumstances(run))
@@ -22,7 +23,7 @@ pub fn all(run: &ReviewedRun, score: &Value) -> Markup {
             (summary(&cells))
             (group(run))
             (boats(&cells))
-            (rounds(run, score))
+            (rounds(run, score, has_video))
         }
     }
 }
@@ -56,39 +57,11 @@ fn circumstances(run: &ReviewedRun) -> Markup {
     }
 }
 
-/// Cells with numbers of the score.
-struct Cells<'a> {
-    score: &'a Value,
-}
-
-impl Cells<'_> {
-    /// A cell with the number at a JSON pointer, shown with so many digits after the point.
-    fn number(&self, pointer: &str, digits: usize) -> Markup {
-        let value = self.score.pointer(pointer);
-        let shown = match value.and_then(Value::as_f64) {
-            Some(number) => format!("{number:.digits$}"),
-            None => "-".to_owned(),
-        };
-        html! { td.number data-score=(pointer) data-value=[value.filter(|v| v.is_number()).map(Value::to_string)] { (shown) } }
-    }
-
-    fn text(&self, pointer: &str) -> String {
-        self.score.pointer(pointer).and_then(Value::as_str).map_or_else(|| "-".to_owned(), one_line)
-    }
-
-    fn count(&self, pointer: &str) -> usize {
-        self.score.pointer(pointer).and_then(Value::as_array).map_or(0, Vec::len)
-    }
-}
-
 fn points(cells: &Cells<'_>) -> Markup {
-    const MEANING: &str = "Points are parts of those that the scenario asks for: 50 for hostile boats that were stopped or turned away, 15 for \
-                           keeping them off, 15 for rounds that struck, 20 for calls. 20 are taken off for each neutral boat that was struck, and \
-                           10 for each burst that broke the rules.";
     html! {
         section.panel {
             h2 { "Points" }
-            p.muted { (MEANING) }
+            p.muted { (POINTS) }
             table {
                 thead { tr { th { "Item" } th.number { "Points" } th.number { "Of" } } }
                 tbody {
@@ -111,31 +84,6 @@ fn version(cells: &Cells<'_>) -> Markup {
     let value = cells.score.pointer("/version").map(Value::to_string);
     html! { span data-score="/version" data-value=[value.as_deref()] { (value.as_deref().unwrap_or("-")) } }
 }
-
-/// Rows of the summary: what, where in the score, digits, and what it means.
-const SUMMARY: [(&str, &str, usize, &str); 21] = [
-    ("Duration, s", "/duration_s", 1, "from the beginning of the exercise to its end"),
-    ("Hostile boats", "/hostile", 0, ""),
-    ("Stopped", "/stopped", 0, "struck, and have lost their way"),
-    ("Turned away", "/turned_away", 0, "went away or gave up"),
-    ("Under threat, s", "/under_threat_s", 1, "a hostile boat was within the range to be kept"),
-    ("Nearest, m", "/nearest_m", 1, "that a hostile boat came"),
-    ("Rounds fired", "/rounds/fired", 0, ""),
-    ("Hits", "/rounds/hits", 0, "on hostile boats"),
-    ("Neutral hits", "/rounds/neutral_hits", 0, "a round that bursts may strike several"),
-    ("Not scored", "/rounds/not_scored", 0, "it was not known where the barrel pointed"),
-    ("Bursts", "/rounds/bursts", 0, "at a boat"),
-    ("First-round hits", "/rounds/first_round_hits", 0, "bursts whose first round struck a hostile boat"),
-    ("Rounds a stop", "/rounds/per_stop", 1, "for each hostile boat that was stopped"),
-    ("Rounds left", "/rounds/left", 0, ""),
-    ("Stoppages", "/rounds/stoppages", 0, "of the virtual weapon"),
-    ("Barrel hot", "/rounds/barrel_hot", 0, "times"),
-    ("Calls asked for", "/calls/asked", 0, ""),
-    ("Calls in time", "/calls/in_time", 0, ""),
-    ("Calls late", "/calls/late", 0, ""),
-    ("Calls missing", "/calls/missing", 0, ""),
-    ("Calls wrong", "/calls/wrong", 0, "boats called hostile that are neutral, or the reverse"),
-];
 
 fn summary(cells: &Cells<'_>) -> Markup {
     let parts = cells.score.pointer("/rounds/by_part").and_then(Value::as_object);
@@ -261,7 +209,7 @@ fn group(run: &ReviewedRun) -> Markup {
         return html! {};
     }
     html! {
-        section.panel {
+        section.panel.group {
             h2 { "Rounds about the target" }
             p.muted { "As the shooter saw it: to the right and over are positive. Misses that were aimed, and their error over the run." }
             div.plot id="group" role="img" aria-label="Misses about the target, metres to the right and over. The same numbers are in the table of rounds." {}
@@ -270,14 +218,15 @@ fn group(run: &ReviewedRun) -> Markup {
     }
 }
 
-fn rounds(run: &ReviewedRun, score: &Value) -> Markup {
-    let cells = Cells { score };
+fn rounds(run: &ReviewedRun, score: &Value, has_video: bool) -> Markup {
+    let cells = Cells::of(score);
     html! {
         section.panel.wide {
             h2 { "Rounds" }
             p.muted { "A round's errors are to the right and over, at the target." }
             div.scroll.long tabindex="0" { table {
                 thead { tr {
+                    @if has_video { th.screen-only { "Picture" } }
                     th.number { "Round" } th.number { "Fired, s" } th { "Outcome" } th.number { "Range, m" }
                     th.number { "Right, m" } th.number { "Over, m" } th.number { "Right, mrad" } th.number { "Over, mrad" } th { "Cause" }
                 } }
@@ -288,6 +237,7 @@ fn rounds(run: &ReviewedRun, score: &Value) -> Markup {
                         @let (weight, words) = words::round(record, found.map(|(_, round)| round));
                         @let fired_s = run.seconds(record.fired.ns());
                         tr data-time=(fired_s) data-shot=(record.shot) {
+                            @if has_video { td.screen-only { canvas.moment width="144" height="81" role="img" aria-label={ "Picture as round " (record.shot) " was fired" } {} } }
                             td.number { (record.shot) }
                             td.number { (format!("{fired_s:.2}")) }
                             td { (badge(&record.outcome, weight)) " " (words) }

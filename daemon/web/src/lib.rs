@@ -49,6 +49,8 @@ pub struct Page<'a> {
     pub modules: &'a [Module],
     /// The name of the one that is run.
     pub main: &'a str,
+    /// It plays a video from a file near it.
+    pub plays_files: bool,
 }
 
 impl Page<'_> {
@@ -56,13 +58,15 @@ impl Page<'_> {
     pub fn to_html(&self) -> String {
         // Nothing that the page's data says is run, and nothing is fetched.
         const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' data:; style-src 'unsafe-inline'; img-src data: blob:; \
-                              media-src data: blob:; base-uri 'none'; form-action 'none'";
+                              base-uri 'none'; form-action 'none'; media-src data: blob:";
+        // A page from the disk has no origin of its own: its neighbours are files.
+        let policy = if self.plays_files { format!("{POLICY} 'self' file:") } else { POLICY.to_owned() };
         let page = html! {
             (DOCTYPE)
             html lang="en" data-obc-theme="day" {
                 head {
                     meta charset="utf-8";
-                    meta http-equiv="Content-Security-Policy" content=(POLICY);
+                    meta http-equiv="Content-Security-Policy" content=(policy);
                     meta name="viewport" content="width=device-width, initial-scale=1";
                     title { (self.title) }
                     style { (PreEscaped(LOOK)) (PreEscaped(self.style)) }
@@ -140,6 +144,7 @@ mod tests {
             data,
             modules: &modules,
             main: "a.js",
+            plays_files: false,
         };
         let html = page.to_html();
         assert!(!html.contains("alert(1)</script>") && html.contains("\\u003c/script>"), "{html}");

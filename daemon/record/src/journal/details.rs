@@ -27,6 +27,8 @@ pub struct RunDetails {
     pub wind_m_s: [f64; 2],
     /// The camera.
     pub camera: CameraDetails,
+    /// Latitude and longitude of the place that the scenario names, degrees.
+    pub place_deg: Option<[f64; 2]>,
 }
 
 /// A boat of the scenario.
@@ -89,6 +91,10 @@ impl RunDetails {
                 centre: lens.centre.to_array(),
                 bore: calibration.bore_in_camera().to_array(),
             },
+            place_deg: scenario
+                .daylight
+                .moment
+                .map(|moment| [moment.place.latitude_deg(), moment.place.longitude_deg()]),
         }
     }
 

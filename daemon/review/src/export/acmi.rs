@@ -1,11 +1,11 @@
 //! ACMI 2.2, the text format of flight recordings that debriefers open in Tacview.
 //!
-//! Places are degrees about 0 N 0 E, where a metre east and a metre north are known shares of a degree: a run knows its places from the gun, not
-//! from the Earth.
+//! Places are degrees from the gun, which stands at 0 N 0 E where its place on the Earth is not known.
 
 use std::{collections::BTreeMap, fmt::Write as _};
 
 use bowwave_core::{
+    ephemeris::Place,
     geometry::bearing_and_elevation_deg,
     text::one_line,
     world::track::{RoundPath, TrackPose},
@@ -13,10 +13,9 @@ use bowwave_core::{
 use glam::{DQuat, DVec3};
 use jiff::Timestamp;
 
+use super::earth::longitude_latitude;
 use crate::{run::ReviewedRun, words};
 
-/// Metres of a degree of longitude and of latitude where both are 0 (WGS 84).
-const DEGREE_M: [f64; 2] = [111_319.491, 110_574.276];
 /// Numbers of objects: the own gun, the first boat, the first round.
 const GUN: u64 = 1;
 const BOATS: u64 = 0x100;
@@ -39,10 +38,13 @@ pub fn acmi(run: &ReviewedRun) -> String {
 
 fn header(run: &ReviewedRun) -> String {
     let started = run.stored.run.started_wall_ns.unwrap_or(0);
+    let place = run.place;
     format!(
-        "FileType=text/acmi/tacview\nFileVersion=2.2\n0,ReferenceTime={}\n0,ReferenceLongitude=0\n0,ReferenceLatitude=0\n0,Title={}\n\
+        "FileType=text/acmi/tacview\nFileVersion=2.2\n0,ReferenceTime={}\n0,ReferenceLongitude={}\n0,ReferenceLatitude={}\n0,Title={}\n\
          0,DataSource=Bowwave {}\n0,Category=Virtual gunnery training\n",
         utc(started),
+        place.map_or(0.0, Place::longitude_deg),
+        place.map_or(0.0, Place::latitude_deg),
         value(&run.stored.run.scenario),
         value(&run.stored.run.version)
     )
@@ -70,7 +72,7 @@ fn frames(run: &ReviewedRun) -> BTreeMap<i64, Vec<String>> {
             let id = BOATS + boat as u64;
             match sample.boats.get(boat).copied().flatten() {
                 Some(pose) => {
-                    let mut line = format!("{id:x},{}", placed(&pose));
+                    let mut line = format!("{id:x},{}", placed(&pose, run));
                     if !known[boat] {
                         known[boat] = true;
                         let colour = if details.side == "neutral" { "Green" } else { "Red" };
@@ -87,7 +89,7 @@ fn frames(run: &ReviewedRun) -> BTreeMap<i64, Vec<String>> {
             }
         }
     }
-    run.tracks.tracks.rounds.iter().for_each(|path| round(path, &mut put));
+    run.tracks.tracks.rounds.iter().for_each(|path| round(path, run, &mut put));
     for event in &run.scored.events {
         if let Some((_, words, boat)) = words::event(&event.fact) {
             let about = boat.map_or_else(String::new, |name| format!("{} ", one_line(name)));
@@ -103,25 +105,25 @@ fn frames(run: &ReviewedRun) -> BTreeMap<i64, Vec<String>> {
 fn gun(camera: &TrackPose, run: &ReviewedRun) -> String {
     let [bearing, elevation] =
         bearing_and_elevation_deg(attitude(camera) * DVec3::from(run.details.camera.bore));
-    let [lon, lat] = degrees(camera.position);
+    let [lon, lat] = degrees(run, camera.position);
     format!("{GUN:x},T={lon:.9}|{lat:.9}|{:.3}|0|{elevation:.3}|{bearing:.3}", camera.position[2])
 }
 
 /// Place and attitude of a boat: roll is positive with starboard down, pitch with the bow up.
-fn placed(pose: &TrackPose) -> String {
+fn placed(pose: &TrackPose, run: &ReviewedRun) -> String {
     let turn = attitude(pose);
     let [heading, pitch] = bearing_and_elevation_deg(turn * DVec3::X);
     let roll = (turn * DVec3::Y).z.atan2((turn * DVec3::Z).z).to_degrees();
-    let [lon, lat] = degrees(pose.position);
+    let [lon, lat] = degrees(run, pose.position);
     format!("T={lon:.9}|{lat:.9}|{:.3}|{roll:.2}|{pitch:.2}|{heading:.2}", pose.position[2])
 }
 
-fn round(path: &RoundPath, put: &mut impl FnMut(i64, String)) {
+fn round(path: &RoundPath, run: &ReviewedRun, put: &mut impl FnMut(i64, String)) {
     let id = ROUNDS + path.shot;
     let mut time_ns = path.fired_ns;
     for (i, point) in path.points.iter().enumerate() {
         time_ns = path.fired_ns + (f64::from(point.after_s) * 1e9) as i64;
-        let [lon, lat] = degrees(point.position);
+        let [lon, lat] = degrees(run, point.position);
         let mut line = format!("{id:x},T={lon:.9}|{lat:.9}|{:.3}", point.position[2]);
         if i == 0 {
             let _ = write!(line, ",Name=round {},Type=Projectile+Bullet,Color=Blue", path.shot);
@@ -136,8 +138,13 @@ fn attitude(pose: &TrackPose) -> DQuat {
     DQuat::from_array(pose.attitude.map(f64::from))
 }
 
-fn degrees([x, y, _]: [f32; 3]) -> [f64; 2] {
-    [f64::from(x) / DEGREE_M[0], f64::from(y) / DEGREE_M[1]]
+/// Degrees of longitude and latitude from the gun.
+fn degrees(run: &ReviewedRun, [x, y, _]: [f32; 3]) -> [f64; 2] {
+    let offset = [f64::from(x), f64::from(y)];
+    let Some(gun) = run.place.or_else(|| Place::new(0.0, 0.0)) else { return [0.0; 2] };
+    let [lon, lat] = longitude_latitude(gun, offset);
+    // West of 180 E is east of 180 W.
+    [(lon - gun.longitude_deg() + 540.0).rem_euclid(360.0) - 180.0, lat - gun.latitude_deg()]
 }
 
 /// A text as a property's value.

@@ -23,6 +23,8 @@ use bowwave_render::{DrawRequest, RenderConfig, RenderError, Renderer, TimeOuts}
 
 use output::{OutputThread, Ticket};
 
+pub use video::VideoTimes;
+
 pub use output::{CompletedFrame, OutputOptions, OutputReport, Seat, UserEvent};
 
 /// A driver that compiles for longer than this is not waited for, seconds.
@@ -106,7 +108,8 @@ impl Presenter {
     /// lasted too long. Gives `true` where it is complete.
     fn warm_up_slot(&mut self, scene: &Scene, picture: &Picture, warm_up_begun: Time) -> Result<bool> {
         let begun = now();
-        let ticket = Ticket { frame: 0, begun, submitted: begun, deadline: None, warm_up: true };
+        let ticket =
+            Ticket { frame: 0, begun, submitted: begun, shows: begun, deadline: None, warm_up: true };
         self.renderer.submit(DrawRequest { scene, picture, picture_is_new: true, ticket })?;
         if let Some(output) = &self.output {
             // A software driver on a slow computer compiles for a long time at its first start; the renderer's own time-out
@@ -130,7 +133,8 @@ impl Presenter {
         begun: Time,
         deadline: Option<Time>,
     ) -> Result<Handed, RenderError> {
-        let ticket = Ticket { frame: view.scene.frame, begun, submitted: now(), deadline, warm_up: false };
+        let (frame, shows) = (view.scene.frame, view.mid_exposure);
+        let ticket = Ticket { frame, begun, submitted: now(), shows, deadline, warm_up: false };
         let View { scene, picture, picture_is_new, .. } = *view;
         let waited = self.renderer.submit(DrawRequest { scene, picture, picture_is_new, ticket })?;
         let taken = self.output.as_ref().is_some_and(OutputThread::runs);

@@ -24,7 +24,7 @@ use super::{
     hashes::HashLog,
     lateness::Lateness,
     pictures::{ContactSheet, copy_frame, write_still},
-    video::VideoWriter,
+    video::{VideoTimes, VideoWriter},
     window::{Pressed, Screen},
 };
 use crate::{instructor::PictureTap, summary::stats::Samples};
@@ -89,6 +89,8 @@ pub struct Ticket {
     pub begun: Time,
     /// When it was handed to the GPU.
     pub submitted: Time,
+    /// The time that it shows: the mid-exposure of its picture.
+    pub shows: Time,
     /// When it must be complete.
     pub deadline: Option<Time>,
     /// Drawn so that the driver is warm, not to be shown or counted.
@@ -140,6 +142,8 @@ pub struct OutputReport {
     pub first: Option<Time>,
     /// Over the SHA-256 of each frame; `None` where nobody asked for it.
     pub frames_sha256: Option<[u8; 32]>,
+    /// Times of the video's frames; `None` without one.
+    pub video: Option<VideoTimes>,
 }
 
 impl OutputReport {
@@ -152,6 +156,8 @@ impl OutputReport {
         self.passes_ms.iter_mut().zip(&later.passes_ms).for_each(|(all, more)| all.add(more));
         self.first = self.first.or(later.first);
         self.frames_sha256 = later.frames_sha256;
+        // It has begun its file from the start.
+        self.video = later.video;
     }
 }
 
@@ -270,7 +276,7 @@ impl OutputWorker {
             }
         }
         if let Some(video) = self.video.take() {
-            video.finish()?;
+            self.report.video = Some(video.finish()?);
         }
         if let Some(sheet) = &self.sheet {
             sheet.write(&self.options.folder.join("contact-sheet.png"))?;
@@ -326,7 +332,7 @@ impl OutputWorker {
             hashes.frame(ticket.frame, frame.rgba())?;
         }
         if let Some(video) = &mut self.video {
-            video.frame(frame.rgba())?;
+            video.frame(frame.rgba(), ticket.shows)?;
         }
         self.pictures(frame, ticket.frame)
     }

@@ -8,10 +8,45 @@ use std::{
 };
 
 use anyhow::{Context, Result, anyhow, bail};
+use bowwave_core::{
+    pacing::FRAMES_PER_S,
+    time::{NS_PER_S, Time},
+};
 use crossbeam_channel::{Receiver, Sender, bounded};
 
 /// Frames that wait for ffmpeg: it takes half a second to begin, and drawing must not wait for that.
 const QUEUE: usize = 20;
+
+/// Times that a video's frames show may be off by so much from thirty a second before that is kept: more than a picture's own trembling, less
+/// than a frame.
+const PACE_NS: i64 = 20_000_000;
+
+/// The times that the frames of a video show, on the session's clock.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct VideoTimes {
+    frames: u64,
+    marks: Vec<(u64, Time)>,
+}
+
+impl VideoTimes {
+    /// Takes in the next frame.
+    fn frame(&mut self, shows: Time) {
+        let on_pace = |(from, time): &(u64, Time)| {
+            let frames = i64::try_from(self.frames - from).unwrap_or(i64::MAX);
+            time.plus_ns(frames.saturating_mul(NS_PER_S) / FRAMES_PER_S)
+        };
+        let expected = self.marks.last().map(on_pace);
+        if expected.is_none_or(|time| shows.ns_since(time).abs() > PACE_NS) {
+            self.marks.push((self.frames, shows));
+        }
+        self.frames += 1;
+    }
+
+    /// The first frame's number and time, and those of each from which thirty a second no longer hold. Times are nanoseconds.
+    pub fn marks(&self) -> Vec<(u64, i64)> {
+        self.marks.iter().map(|(frame, time)| (*frame, time.ns())).collect()
+    }
+}
 
 /// Frames on their way into an H.264 file.
 #[derive(Debug)]
@@ -22,6 +57,7 @@ pub struct VideoWriter {
     empty: Receiver<Vec<u8>>,
     feeder: Option<JoinHandle<std::io::Result<()>>>,
     path: PathBuf,
+    times: VideoTimes,
 }
 
 /// Writes frames as they come and gives their buffers back.
@@ -58,11 +94,19 @@ impl VideoWriter {
             .name("video".to_owned())
             .spawn(move || feed(stdin, &waiting, &used))
             .context("cannot start the video's thread; are too many processes running?")?;
-        Ok(Self { child, frames: Some(frames), empty, feeder: Some(feeder), path: path.to_path_buf() })
+        Ok(Self {
+            child,
+            frames: Some(frames),
+            empty,
+            feeder: Some(feeder),
+            path: path.to_path_buf(),
+            times: VideoTimes::default(),
+        })
     }
 
-    /// Adds a frame, sRGB RGBA bytes from the upper left.
-    pub fn frame(&mut self, rgba: &[u8]) -> Result<()> {
+    /// Adds a frame that shows that time, sRGB RGBA bytes from the upper left.
+    pub fn frame(&mut self, rgba: &[u8], shows: Time) -> Result<()> {
+        self.times.frame(shows);
         let mut buffer = self.empty.try_recv().unwrap_or_default();
         buffer.clear();
         buffer.extend_from_slice(rgba);
@@ -75,9 +119,10 @@ impl VideoWriter {
         Ok(())
     }
 
-    /// Ends the file.
-    pub fn finish(mut self) -> Result<()> {
-        self.finish_inner()
+    /// Ends the file, and gives the times of its frames.
+    pub fn finish(mut self) -> Result<VideoTimes> {
+        self.finish_inner()?;
+        Ok(std::mem::take(&mut self.times))
     }
 
     fn finish_inner(&mut self) -> Result<()> {
@@ -113,5 +158,21 @@ impl Drop for VideoWriter {
                 log::warn!("cannot wait for ffmpeg: {e}");
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_kept_from_where_the_pace_breaks() {
+        let mut times = VideoTimes::default();
+        let origin = Time::from_ns(5 * NS_PER_S);
+        // Pictures tremble by a millisecond; two ticks are missed after the third frame.
+        for (tick, trembling_ns) in [(0, 0), (1, 1_000_000), (2, -1_000_000), (5, 0), (6, 900_000)] {
+            times.frame(origin.plus_ns(tick * NS_PER_S / FRAMES_PER_S + trembling_ns));
+        }
+        assert_eq!(times.marks(), [(0, 5_000_000_000), (3, 5_166_666_666)]);
     }
 }

@@ -78,6 +78,9 @@ pub struct Summary {
     pub scenario: String,
     /// Layout of the camera's pictures and how they reached the GPU.
     pub video: String,
+    /// Frames of video.mp4 with the times that they show, nanoseconds on the session's clock: the first, and each from which thirty a second no
+    /// longer hold. Null without a video.
+    pub video_frames: Option<Vec<(u64, i64)>>,
     /// How often each fault came, by its code.
     pub faults: BTreeMap<String, u64>,
     /// What source and session counted: dropped, late, broken.

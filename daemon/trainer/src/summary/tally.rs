@@ -27,7 +27,7 @@ use super::{
 };
 use crate::{
     clock::{DueFrame, TickClock},
-    presenter::OutputReport,
+    presenter::{OutputReport, VideoTimes},
 };
 
 /// What a summary says besides what was measured.
@@ -185,6 +185,7 @@ impl Tally {
             recording: options.recording.clone(),
             scenario: session.scenario_name().to_owned(),
             video: format!("{:?}, {video}", plan.video),
+            video_frames: output.video.as_ref().map(VideoTimes::marks),
             faults: faults.map(|(code, n)| (code.to_owned(), n)).collect(),
             counts: self.counts(session, clock, counters),
             sea: session.sea().map(SeaSummary::from),

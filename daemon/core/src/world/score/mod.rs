@@ -1,6 +1,7 @@
 //! Results of virtual rounds: the records that outlive a session, and the swept test that decides them.
 
 mod closest;
+mod fold;
 mod hit;
 mod miss;
 mod round;
@@ -9,14 +10,14 @@ mod sheet;
 use glam::DVec3;
 
 pub use closest::{Closest, closest_to_box, closest_to_surface};
+pub use fold::ScoreFold;
 #[cfg(test)]
 pub(crate) use hit::tests::boxed as boxed_model;
 pub use hit::{Moving, Strike, strike};
 pub use miss::{AIM_TREND_S, BoreSample, MissCause, MissExplanation, MissedRound};
 pub use round::{Approach, End, Round};
 pub use sheet::{
-    BoatSheet, Breach, CallsSheet, CauseSheet, Ending, PointsItem, RoundsSheet, SCORE_VERSION, ScoreFold,
-    ScoreSheet,
+    BoatSheet, Breach, CallsSheet, CauseSheet, Ending, PointsItem, RoundsSheet, SCORE_VERSION, ScoreSheet,
 };
 
 pub use crate::fault::NotScored;

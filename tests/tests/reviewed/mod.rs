@@ -1,0 +1,6 @@
+//! Further parts of the debrief, each with its tests.
+
+mod compare;
+mod paper;
+mod places;
+mod video;
