@@ -69,7 +69,7 @@ impl Hub {
             control: Control::new(),
             frames: Frames::new(options.jpeg_quality, options.picture_width_max),
             library: Library::new(options.library.clone()),
-            link: Arc::new(Link::new(options.socket.clone())),
+            link: Arc::new(Link::new(options.socket.clone(), &options.limits)),
             link_news: watch::Sender::new(news),
             status: watch::Sender::new(None),
             score: watch::Sender::new(None),

@@ -13,17 +13,14 @@ use std::{
     time::Duration,
 };
 
+use bowwave_core::text::one_line;
 use bowwave_link::{
     FromDaemon, Hello, LinkError, Picture, Status, ToDaemon, VERSION, read_from_daemon, write_to_daemon,
 };
 use serde::Serialize;
 
-use crate::{locked, stop::Stop};
+use crate::{locked, options::Limits, stop::Stop};
 
-/// Times between tries to join the trainer.
-const TRY_AGAIN: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(2));
-/// A trainer that says nothing, or takes nothing, for so long is gone.
-const SILENCE_MAX: Duration = Duration::from_secs(5);
 /// Messages that wait for the trainer to take them.
 const WAITING_MAX: usize = 16;
 
@@ -51,13 +48,18 @@ pub(crate) trait Listener: Send + Sync {
 /// The way to the trainer.
 pub(crate) struct Link {
     path: PathBuf,
+    /// Time after which a trainer that says nothing, or takes nothing, is gone.
+    silence_max: Duration,
+    /// Times between tries to join it.
+    tries: (Duration, Duration),
     outgoing: Mutex<Option<SyncSender<ToDaemon>>>,
     stream: Mutex<Option<UnixStream>>,
 }
 
 impl Link {
-    pub(crate) fn new(path: PathBuf) -> Self {
-        Self { path, outgoing: Mutex::default(), stream: Mutex::default() }
+    pub(crate) fn new(path: PathBuf, limits: &Limits) -> Self {
+        let Limits { trainer_silence_max: silence_max, trainer_tries: tries, .. } = *limits;
+        Self { path, silence_max, tries, outgoing: Mutex::default(), stream: Mutex::default() }
     }
 
     /// Hands a message to the trainer, or says in words why not. Never waits.
@@ -82,19 +84,19 @@ impl Link {
 
     /// Joins the trainer and listens to it until it is stopped.
     pub(crate) fn run(&self, listener: &dyn Listener, stop: &Stop) {
-        let mut wait = TRY_AGAIN.0;
+        let mut wait = self.tries.0;
         while !stop.is_asked() {
             let mut joined = false;
             let ended = self.listen(listener, stop, &mut joined);
             *locked(&self.outgoing) = None;
             *locked(&self.stream) = None;
             if joined {
-                log::warn!("the trainer is lost: {ended}");
-                wait = TRY_AGAIN.0;
+                log::warn!("the trainer is lost: {}", one_line(&ended));
+                wait = self.tries.0;
             }
             listener.link(LinkNews { joined: false, words: ended });
             stop.wait(wait);
-            wait = (wait * 2).min(TRY_AGAIN.1);
+            wait = (wait * 2).min(self.tries.1);
         }
     }
 
@@ -115,8 +117,8 @@ impl Link {
 
     fn talk(&self, stream: UnixStream, listener: &dyn Listener, stop: &Stop, joined: &mut bool) -> Ended {
         let prepare = || -> std::io::Result<(UnixStream, UnixStream)> {
-            stream.set_read_timeout(Some(SILENCE_MAX))?;
-            stream.set_write_timeout(Some(SILENCE_MAX))?;
+            stream.set_read_timeout(Some(self.silence_max))?;
+            stream.set_write_timeout(Some(self.silence_max))?;
             Ok((stream.try_clone()?, stream.try_clone()?))
         };
         let (kept, writes) = match prepare() {
@@ -233,7 +235,7 @@ mod tests {
     fn the_trainer_is_joined_again_whatever_it_did() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("socket");
-        let (link, stop) = (Arc::new(Link::new(path.clone())), Arc::new(Stop::default()));
+        let (link, stop) = (Arc::new(Link::new(path.clone(), &Limits::default())), Arc::new(Stop::default()));
         let (sender, said) = mpsc::channel();
         let thread = spawn(Arc::clone(&link), Arc::new(Tells(sender)), Arc::clone(&stop)).unwrap();
         let wait = |start: &str| loop {

@@ -18,7 +18,7 @@ pub struct TlsFiles {
     pub key: PathBuf,
 }
 
-/// Bounds of what clients may take.
+/// Bounds of what clients may take, and of what the trainer may.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Connections at one time.
@@ -37,6 +37,10 @@ pub struct Limits {
     pub session: Duration,
     /// Time after which control lapses whose holder has no page open any longer.
     pub control_lapses: Duration,
+    /// Time after which a trainer is gone that says nothing, or takes nothing.
+    pub trainer_silence_max: Duration,
+    /// Least and greatest time between tries to join the trainer.
+    pub trainer_tries: (Duration, Duration),
 }
 
 impl Default for Limits {
@@ -50,6 +54,8 @@ impl Default for Limits {
             silence_max: Duration::from_secs(30),
             session: Duration::from_secs(12 * 3600),
             control_lapses: Duration::from_secs(30),
+            trainer_silence_max: Duration::from_secs(5),
+            trainer_tries: (Duration::from_millis(100), Duration::from_secs(2)),
         }
     }
 }

@@ -15,6 +15,9 @@ pub const PICTURE_BYTES_MAX: usize = 36 << 20;
 
 const MESSAGE: u8 = 0;
 const PICTURE: u8 = 1;
+/// Deepest that lists and maps lie in each other: a status, its boats, a boat. For each one that only claims to be long up to a mebibyte is
+/// taken, so no more are gone into.
+const DEPTH_MAX: usize = 8;
 /// Bytes before a picture's pixels: its number, its time, width and height.
 const PICTURE_HEADER: usize = 8 + 8 + 4 + 4;
 
@@ -162,7 +165,9 @@ fn bytes(from: &mut impl Read, kind: u8, length: usize, most: usize) -> Result<V
 }
 
 fn content<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, LinkError> {
-    rmp_serde::from_slice(bytes).map_err(|e| LinkError::Content(e.to_string()))
+    let mut from = rmp_serde::Deserializer::from_read_ref(bytes);
+    from.set_max_depth(DEPTH_MAX);
+    T::deserialize(&mut from).map_err(|e| LinkError::Content(e.to_string()))
 }
 
 fn picture(bytes: &[u8]) -> Result<Picture, LinkError> {

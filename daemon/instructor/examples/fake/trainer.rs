@@ -19,10 +19,19 @@ use bowwave_link::{
 };
 use rustix::time::{ClockId, clock_gettime};
 
-/// Width and height of its picture, pixels.
-pub const SIZE: (u32, u32) = (1280, 720);
-/// Its frames a second.
-const RATE: u64 = 30;
+/// Size and pace of what a trainer that is none shows.
+#[derive(Clone, Copy, Debug)]
+pub struct Pace {
+    /// Width and height of its picture, pixels.
+    pub size: (u32, u32),
+    /// Frames a second.
+    pub rate: u64,
+    /// Frames for each status.
+    pub frames_a_status: u64,
+}
+
+/// As a real one.
+pub const USUAL: Pace = Pace { size: (1280, 720), rate: 30, frames_a_status: 6 };
 
 /// A trainer that is none.
 pub struct FakeTrainer {
@@ -43,6 +52,11 @@ struct State {
 impl FakeTrainer {
     /// Listens at `path`; its statuses name that journal.
     pub fn start(path: &Path, journal: Option<&Path>) -> std::io::Result<Self> {
+        Self::start_at(path, journal, USUAL)
+    }
+
+    /// The same at another pace.
+    pub fn start_at(path: &Path, journal: Option<&Path>, pace: Pace) -> std::io::Result<Self> {
         let _ = std::fs::remove_file(path);
         let listener = UnixListener::bind(path)?;
         listener.set_nonblocking(true)?;
@@ -52,7 +66,7 @@ impl FakeTrainer {
         let state = Arc::new(Mutex::new(state));
         let thread = thread::spawn({
             let (stop, state) = (Arc::clone(&stop), Arc::clone(&state));
-            move || listen(&listener, &stop, &state)
+            move || listen(&listener, pace, &stop, &state)
         });
         Ok(Self { stop, state, thread: Some(thread) })
     }
@@ -214,11 +228,11 @@ impl State {
     }
 }
 
-fn listen(listener: &UnixListener, stop: &AtomicBool, state: &Mutex<State>) {
+fn listen(listener: &UnixListener, pace: Pace, stop: &AtomicBool, state: &Mutex<State>) {
     while !stop.load(Ordering::Relaxed) {
         match listener.accept() {
             Ok((stream, _)) => {
-                if let Err(error) = play(&stream, stop, state) {
+                if let Err(error) = play(&stream, pace, stop, state) {
                     log::info!("the instructor's process: {error}");
                 }
                 let _ = stream.shutdown(std::net::Shutdown::Both);
@@ -228,7 +242,7 @@ fn listen(listener: &UnixListener, stop: &AtomicBool, state: &Mutex<State>) {
     }
 }
 
-fn play(stream: &UnixStream, stop: &AtomicBool, state: &Mutex<State>) -> Result<(), LinkError> {
+fn play(stream: &UnixStream, pace: Pace, stop: &AtomicBool, state: &Mutex<State>) -> Result<(), LinkError> {
     stream.set_nonblocking(false)?;
     let mut writes = BufWriter::with_capacity(1 << 18, stream.try_clone()?);
     let mut reads = BufReader::new(stream.try_clone()?);
@@ -251,7 +265,7 @@ fn play(stream: &UnixStream, stop: &AtomicBool, state: &Mutex<State>) -> Result<
             }
             gone.store(true, Ordering::Relaxed);
         });
-        let outcome = show(&mut writes, stop, state, &asked, &gone, &refused);
+        let outcome = show(&mut writes, pace, stop, state, &asked, (&gone, &refused));
         let _ = stream.shutdown(std::net::Shutdown::Both);
         outcome
     })
@@ -259,21 +273,22 @@ fn play(stream: &UnixStream, stop: &AtomicBool, state: &Mutex<State>) -> Result<
 
 fn show(
     to: &mut BufWriter<UnixStream>,
+    pace: Pace,
     stop: &AtomicBool,
     state: &Mutex<State>,
     asked: &AtomicU64,
-    gone: &AtomicBool,
-    refused: &Mutex<Option<String>>,
+    (gone, refused): (&AtomicBool, &Mutex<Option<String>>),
 ) -> Result<(), LinkError> {
-    let sea = sea();
+    let Pace { size: (width, height), rate, frames_a_status } = pace;
+    let sea = sea(pace.size);
     let mut next = Instant::now();
     for frame in 1.. {
         if stop.load(Ordering::Relaxed) || gone.load(Ordering::Relaxed) {
             break;
         }
-        if frame % 6 == 0 {
+        if frame % frames_a_status == 0 {
             let mut state = lock(state);
-            state.step(6.0 / RATE as f64);
+            state.step(frames_a_status as f64 / rate as f64);
             let status = Box::new(state.status.clone());
             drop(state);
             write_from_daemon(to, FromDaemon::Status(status))?;
@@ -283,20 +298,18 @@ fn show(
             write_from_daemon(to, FromDaemon::Refused(why))?;
         }
         if asked.swap(0, Ordering::Relaxed) > 0 {
-            let (width, height) = SIZE;
-            let rgba = moved(&sea, frame);
+            let rgba = moved(&sea, width, frame);
             write_picture(to, &Picture { frame, complete_ns: now_ns(), width, height, rgba })?;
             lock(state).pictures += 1;
         }
-        next += Duration::from_nanos(1_000_000_000 / RATE);
+        next += Duration::from_nanos(1_000_000_000 / rate);
         thread::sleep(next.saturating_duration_since(Instant::now()));
     }
     Ok(())
 }
 
 /// A sky and a sea with the noise of a camera.
-fn sea() -> Vec<u8> {
-    let (width, height) = SIZE;
+fn sea((width, height): (u32, u32)) -> Vec<u8> {
     let mut noise = 1u32;
     let mut pixels = Vec::with_capacity((width * height * 4) as usize);
     for y in 0..height {
@@ -319,10 +332,10 @@ fn sea() -> Vec<u8> {
 }
 
 /// The sea with a boat that crosses.
-fn moved(sea: &[u8], frame: u64) -> Vec<u8> {
+fn moved(sea: &[u8], width: u32, frame: u64) -> Vec<u8> {
     let mut pixels = sea.to_vec();
-    let width = u64::from(SIZE.0);
-    let left = (frame * 4) % (width - 120);
+    let width = u64::from(width);
+    let left = (frame * 4) % width.saturating_sub(120).max(1);
     for y in 330u64..352 {
         let slant = (y - 330) / 2;
         let from = ((y * width + left + slant) * 4) as usize;

@@ -8,7 +8,9 @@ pub mod calibration;
 pub mod config;
 pub mod imu;
 pub mod imu_formats;
+pub mod instructor_command;
 pub mod jpeg;
+pub mod link;
 mod memory;
 pub mod model;
 mod place;
@@ -29,4 +31,6 @@ pub const ALL: &[FuzzTarget] = &[
     ("recording", recording::run),
     ("scenario", scenario::run),
     ("model", model::run),
+    ("link", link::run),
+    ("instructor_command", instructor_command::run),
 ];
