@@ -27,7 +27,6 @@ export class Commands {
     by("pause").addEventListener("click", () => this.order({ order: this.isPaused ? "resume" : "pause" }));
     this.confirmed(by("reset"), () => this.give({ kind: "reset" }));
     this.confirmed(by("stand-by"), () => this.give({ kind: "stand_by" }));
-    by("control").addEventListener("click", () => this.control());
     this.form("message", (text) => ({ order: "message", text }));
     this.form("note", (text) => ({ order: "note", text }));
     by("inject-form").addEventListener("submit", (event) => {

@@ -26,6 +26,8 @@ const state = {
   asks: true,
   /** A session that ends was ended here. */
   leaves: false,
+  /** Control is taken once somebody is logged in. */
+  wants: false,
   number: -1,
   /** When the number rose last. */
   risen: performance.now(),
@@ -95,6 +97,8 @@ connection.on("you", ({ name, asks_for_token }) => {
   by("session").title = name === null ? "with a token" : `logged in as ${name}`;
   scenarios.load(name !== null);
   enable();
+  if (name !== null && state.wants) commands.control();
+  state.wants = false;
 });
 connection.on("control", ({ holder, is_own }) => showControl(holder, is_own));
 
@@ -115,21 +119,34 @@ function enable() {
     /** @type {HTMLButtonElement} */ (button).disabled = !commands.hasControl;
   });
   for (const id of ["reset", "stand-by", "start"]) /** @type {HTMLButtonElement} */ (by(id)).disabled = !commands.hasControl || !canLoad;
-  /** @type {HTMLButtonElement} */ (by("control")).disabled = state.name === null;
+  /** @type {HTMLButtonElement} */ (by("control")).disabled = !connection.isOpen;
   document.body.classList.toggle("watches", !commands.hasControl);
 }
 enable();
 
+/** Asks for a token where one is wanted. */
+async function logIn() {
+  if (state.asks) open(by("login"));
+  else await login("");
+}
+by("control").addEventListener("click", () => {
+  if (state.name !== null) return commands.control();
+  state.wants = true;
+  return logIn();
+});
 by("session").addEventListener("click", async () => {
-  if (state.name === null && state.asks) open(by("login"));
-  else if (state.name === null) await login("");
+  if (state.name === null) await logIn();
   else {
     state.leaves = true;
     await ask("POST", "/logout", "").catch((error) => log(error.message, "alarm"));
     connection.again();
   }
 });
-by("login-cancel").addEventListener("click", () => close(by("login")));
+by("login-cancel").addEventListener("click", () => {
+  state.wants = false;
+  close(by("login"));
+});
+by("login").addEventListener("cancel", () => (state.wants = false));
 by("login-form").addEventListener("submit", async (event) => {
   event.preventDefault();
   await login(/** @type {HTMLInputElement} */ (by("token")).value);
