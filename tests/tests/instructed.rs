@@ -8,10 +8,11 @@
     reason = "a test that cannot go on has failed"
 )]
 
+mod playing;
+
 use std::{
     os::unix::net::UnixStream,
-    path::{Path, PathBuf},
-    process::{Child, Command},
+    path::Path,
     time::{Duration, Instant},
 };
 
@@ -23,92 +24,7 @@ use bowwave_core::{
 };
 use bowwave_link::{FromDaemon, Hello, Picture, Status, ToDaemon, read_from_daemon, write_to_daemon};
 use bowwave_record::{RunSelection, read_events, read_runs};
-use bowwave_tests::program;
-use tempfile::TempDir;
-
-/// One boat that comes on, and two in reserve.
-const SCENARIO: &str = r#"
-name = "With a reserve"
-seed = 3
-[sea]
-beaufort = 2
-wind_from_deg = 0
-[mount]
-eye_height_m = 6.0
-[weapon]
-rounds_per_minute = 500
-belt = 100
-[[boat]]
-name = "passer-by"
-model = "dhow"
-side = "neutral"
-course = "straight"
-range_m = 300
-bearing_deg = 340
-heading_deg = 90
-speed_kn = 12
-[[boat]]
-name = "late"
-model = "skiff"
-side = "hostile"
-crew = "attacker"
-range_m = 600
-bearing_deg = 10
-count = 2
-reserve = true
-"#;
-
-/// A trainer that plays, with its socket.
-struct Playing {
-    folder: TempDir,
-    child: Child,
-}
-
-impl Playing {
-    fn start() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let scenario = folder.path().join("reserve.toml");
-        std::fs::write(&scenario, SCENARIO).unwrap();
-        let child = Command::new(program())
-            .env("BOWWAVE_CACHE", folder.path())
-            .env_remove("DISPLAY")
-            .arg("play")
-            .arg(&scenario)
-            .args([
-                "--aim",
-                "expert",
-                "--headless",
-                "--camera",
-                "320x180",
-                "--size",
-                "640x360",
-                "--instructor",
-            ])
-            .arg(folder.path().join("s.sock"))
-            .arg("--out")
-            .arg(folder.path().join("out"))
-            .stdout(std::process::Stdio::null())
-            .spawn()
-            .expect("the program starts");
-        Self { folder, child }
-    }
-
-    fn socket(&self) -> PathBuf {
-        self.folder.path().join("s.sock")
-    }
-
-    fn journal(&self) -> PathBuf {
-        self.folder.path().join("out/hits.sqlite")
-    }
-}
-
-impl Drop for Playing {
-    fn drop(&mut self) {
-        // It may have ended already.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
+use playing::{Playing, SCENARIO};
 
 /// An instructor's process, in its place.
 struct Instructor {
@@ -228,8 +144,7 @@ fn an_instructor_runs_an_exercise_and_then_another() {
     assert!(stands.boats.is_empty() && stands.is_paused);
 
     // Killed, it has kept what it was ordered; what is no exercise is no run.
-    playing.child.kill().unwrap();
-    playing.child.wait().unwrap();
+    playing.kill();
     let runs = read_runs(&playing.journal()).unwrap();
     assert_eq!(
         runs.iter().map(|r| r.run.scenario.as_str()).collect::<Vec<_>>(),

@@ -174,7 +174,7 @@ fn boats() -> Markup {
     html! {
         section.panel.boats aria-labelledby="boats-title" {
             h2 id="boats-title" { "Boats" }
-            div.scroll tabindex="0" role="region" aria-label="Boats" { table { thead id="boats-head" {} tbody id="boats" {} } }
+            div.scroll tabindex="0" role="region" aria-label="Table of boats" { table { thead id="boats-head" {} tbody id="boats" {} } }
         }
     }
 }
@@ -189,7 +189,7 @@ fn scenarios() -> Markup {
             div.library {
                 label.list { span.visually-hidden { "Scenarios" } select id="scenario-list" size="9" {} }
                 div.about {
-                    h3 id="about-title" {}
+                    h3 id="about-title" { "No scenario is chosen" }
                     p.muted id="about-facts" {}
                     p.briefing id="about-briefing" {}
                     ul.mistakes id="mistakes" aria-live="polite" {}
@@ -259,7 +259,7 @@ fn runs() -> Markup {
         section.panel.runs aria-labelledby="runs-title" {
             div.head { h2 id="runs-title" { "Runs" } button type="button" id="runs-load" { "Load the list" } }
             p.muted id="runs-note" {}
-            div.scroll tabindex="0" role="region" aria-label="Runs" { table id="runs" {} }
+            div.scroll tabindex="0" role="region" aria-label="Table of runs" { table id="runs" {} }
         }
     }
 }

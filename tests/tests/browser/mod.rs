@@ -1,5 +1,7 @@
 //! A headless Chromium, driven through its driver. Where there is none, that is said, and tests that need it judge nothing.
 
+#![allow(dead_code, reason = "each test file uses some of it")]
+
 use std::{
     net::TcpListener,
     path::Path,
@@ -12,6 +14,9 @@ use hyper_util::client::legacy::connect::HttpConnector;
 use serde_json::{Value, json};
 use tokio::runtime::Runtime;
 
+/// axe-core, as `SOURCES.md` names it.
+pub const AXE: &str = include_str!("axe.min.js");
+
 /// A browser with one page open.
 pub struct Browser {
     runtime: Runtime,
@@ -22,6 +27,13 @@ pub struct Browser {
 impl Browser {
     /// Opens a page from the disk; `None` where there is no browser.
     pub fn open(page: &Path) -> Option<Self> {
+        let browser = Self::start()?;
+        browser.open_file(page);
+        Some(browser)
+    }
+
+    /// Without a page; `None` where there is no browser.
+    pub fn start() -> Option<Self> {
         let port = TcpListener::bind("127.0.0.1:0").and_then(|l| l.local_addr()).expect("a free port").port();
         let driver = Command::new("chromedriver")
             .args([format!("--port={port}"), "--silent".to_owned()])
@@ -35,14 +47,33 @@ impl Browser {
         };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
         let client = runtime.block_on(connect(port));
-        let browser = Self { runtime, client, driver };
+        Some(Self { runtime, client, driver })
+    }
+
+    /// Opens a page from the disk.
+    pub fn open_file(&self, page: &Path) {
         let page = page.canonicalize().expect("the page is there");
-        browser
-            .runtime
-            .block_on(browser.client.goto(&format!("file://{}", page.display())))
-            .expect("it opens");
-        browser.wait("return typeof bowwave === 'object'");
-        Some(browser)
+        self.visit(&format!("file://{}", page.display()));
+    }
+
+    /// Opens a page by its address.
+    pub fn visit(&self, address: &str) {
+        self.runtime.block_on(self.client.goto(address)).expect("it opens");
+        self.wait("return typeof bowwave === 'object'");
+    }
+
+    /// Serious and critical findings of axe-core in the page: the rule, its help and the elements.
+    pub fn axe(&self) -> Vec<String> {
+        const RUN: &str = "const done = arguments[arguments.length - 1];
+            axe.run(document, { resultTypes: ['violations'] }).then(
+                (found) => done(found.violations
+                    .filter((v) => v.impact === 'serious' || v.impact === 'critical')
+                    .map((v) => `${v.impact} ${v.id}: ${v.help}: ${v.nodes.map((n) => `${n.target} (${n.any.map((c) => c.message)})`).join('; ')}`)),
+                (error) => done([`axe-core fails: ${error}`]));";
+        self.run(AXE);
+        let found = self.runtime.block_on(self.client.execute_async(RUN, Vec::new())).expect("axe-core runs");
+        let found = found.as_array().expect("a list of findings").iter();
+        found.map(|words| words.as_str().unwrap_or_default().to_owned()).collect()
     }
 
     /// Runs a script in the page and gives what it returns.
@@ -60,7 +91,16 @@ impl Browser {
 
     /// Waits until a script gives true.
     pub fn wait(&self, script: &str) {
-        let until = Instant::now() + Duration::from_secs(60);
+        self.wait_within(script, Duration::from_secs(60));
+    }
+
+    /// The same, where a trainer has to be started first.
+    pub fn wait_long(&self, script: &str) {
+        self.wait_within(script, Duration::from_secs(300));
+    }
+
+    fn wait_within(&self, script: &str, time: Duration) {
+        let until = Instant::now() + time;
         while self.run(script) != Value::Bool(true) {
             assert!(Instant::now() < until, "in vain: {script}");
             std::thread::sleep(Duration::from_millis(20));
