@@ -14,10 +14,9 @@ use crate::{
     loading::{LoadedScenario, parse_scenario},
 };
 
-/// Folder of the instructor's scenarios: the configured one, else `scenarios` in the data folder.
-pub fn scenarios(config: &Config, data: Option<&Path>) -> PathBuf {
-    let usual = || data.unwrap_or(Path::new("")).join("scenarios");
-    config.instructor.scenarios.clone().unwrap_or_else(usual)
+/// Folder of the models that the instructor's scenarios name: the configured one, else `scenarios` in the data folder.
+pub fn scenarios(config: &Config, data: &Path) -> PathBuf {
+    config.instructor.scenarios.clone().unwrap_or_else(|| data.join("scenarios"))
 }
 
 /// Listens on `socket`. Models that the instructor's scenarios name lie in `scenarios`. `prepare` makes what a scenario needs besides its models,
@@ -41,8 +40,9 @@ pub fn load(asked: &AskedScenario, scenarios: &Path) -> Result<LoadedScenario> {
     let scenario = Scenario::parse(&asked.text, &asked.origin)?;
     if let Some(boat) = scenario.boats.iter().find(|boat| !is_plain(&boat.model)) {
         let problem = format!(
-            "{:?} is a path: name a built-in model, or a file in the folder of the instructor's scenarios by its name alone",
-            boat.model
+            "{:?} is a path: name a built-in model, or a file in {} on the trainer's computer by its name alone",
+            boat.model,
+            scenarios.display()
         );
         return Err(boat.error(problem).into());
     }

@@ -4,7 +4,7 @@ use std::{
     path::PathBuf,
     sync::{
         Arc, Mutex,
-        atomic::{AtomicUsize, Ordering},
+        atomic::{AtomicU64, AtomicUsize, Ordering},
     },
     time::{Duration, Instant},
 };
@@ -54,7 +54,11 @@ pub(crate) struct Hub {
     pub(crate) reviews: Arc<Semaphore>,
     pub(crate) texts: Arc<Semaphore>,
     journal: Mutex<Option<PathBuf>>,
+    /// The scenario that was handed to the trainer last, which may refuse it.
+    asked: Mutex<Option<Begun>>,
     begun: Mutex<Option<Begun>>,
+    /// The trainer's session as it was said last.
+    session: AtomicU64,
     watchers: AtomicUsize,
     /// Pages of the holder of control that are open, by session.
     pages: Mutex<Vec<SessionKey>>,
@@ -77,7 +81,9 @@ impl Hub {
             reviews: Arc::new(Semaphore::new(REVIEWS_MAX)),
             texts: Arc::new(Semaphore::new(TEXTS_MAX)),
             journal: Mutex::default(),
+            asked: Mutex::default(),
             begun: Mutex::default(),
+            session: AtomicU64::new(0),
             watchers: AtomicUsize::new(0),
             pages: Mutex::default(),
             options,
@@ -134,7 +140,7 @@ impl Hub {
     /// Begins a scenario.
     pub(crate) fn begin(&self, origin: String, scenario: String) -> Result<(), String> {
         self.link.send(ToDaemon::Load { origin: origin.clone(), scenario: scenario.clone() })?;
-        *locked(&self.begun) = Some((origin, scenario));
+        *locked(&self.asked) = Some((origin, scenario));
         Ok(())
     }
 
@@ -226,11 +232,19 @@ impl Listener for Hub {
     fn status(&self, mut status: Status) {
         // Where files lie is nothing for everybody who looks on.
         *locked(&self.journal) = status.journal.take().map(PathBuf::from);
+        if status.session != 0 && self.session.swap(status.session, Ordering::Relaxed) != status.session {
+            // It has begun now, and was not refused.
+            let asked = locked(&self.asked).take().filter(|_| !status.stands_by);
+            if asked.is_some() {
+                *locked(&self.begun) = asked;
+            }
+        }
         let shown = json!({"kind": "status", "status": status});
         self.status.send_replace(Some(text(&shown)));
     }
 
     fn refused(&self, why: String) {
+        *locked(&self.asked) = None;
         self.notice(&format!("the trainer refuses: {why}"));
     }
 

@@ -93,6 +93,10 @@ pub(crate) enum LibraryError {
     Name(String),
     #[error("there is no scenario {0:?}: load the list again")]
     Unknown(String),
+    #[error(
+        "there are {LISTED_MAX} scenarios, as many as can be listed: save under the name of one of them, or have some removed"
+    )]
+    Full,
     #[error("no folder for scenarios is configured: give one with --library")]
     NoFolder,
     #[error("the scenario has {0} bytes; {TEXT_BYTES_MAX} are the most")]
@@ -177,6 +181,9 @@ impl Library {
         }
         may_start(text, name)?;
         let path = self.path(name)?;
+        if !path.exists() && self.own_names()?.len() >= LISTED_MAX {
+            return Err(LibraryError::Full);
+        }
         let folder = path.parent().unwrap_or(Path::new(".")).to_owned();
         let write = || -> io::Result<()> {
             fs::create_dir_all(&folder)?;

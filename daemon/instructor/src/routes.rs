@@ -109,7 +109,8 @@ async fn upgrade(
 async fn runs(State(hub): State<Arc<Hub>>, Extension(ends): Extension<Ends>, headers: HeaderMap) -> Answer {
     let _ = known(&hub, ends, &headers)?;
     let journal = hub.journal().map_err(not_found)?;
-    let runs = apart(move || score::runs(&journal)).await?.map_err(not_found)?;
+    let permit = Arc::clone(&hub.texts).acquire_owned().await.map_err(gone)?;
+    let runs = apart(permit, move || score::runs(&journal)).await?.map_err(not_found)?;
     Ok(json(&runs))
 }
 
@@ -123,7 +124,10 @@ async fn review(
     let run: i64 = run.parse().map_err(|_| refusal(StatusCode::NOT_FOUND, "a run has a number"))?;
     let journal = hub.journal().map_err(not_found)?;
     let permit = Arc::clone(&hub.reviews).acquire_owned().await.map_err(gone)?;
-    let page = apart(move || score::review(&journal, run)).await?.map_err(not_found)?;
+    // Who goes away meanwhile does not free a place for another page before this one is done.
+    let made =
+        tokio::task::spawn_blocking(move || (score::review(&journal, run), permit)).await.map_err(gone)?;
+    let (page, permit) = (made.0.map_err(not_found)?, made.1);
     let body = Bytes::from_owner(HeldPage { page, _permit: permit });
     let kind = (header::CONTENT_TYPE, "text/html; charset=utf-8");
     Ok(([kind, (header::CONTENT_SECURITY_POLICY, REVIEW_POLICY)], body).into_response())
@@ -147,9 +151,9 @@ async fn scenarios(
     headers: HeaderMap,
 ) -> Answer {
     let _ = known(&hub, ends, &headers)?;
-    let _permit = Arc::clone(&hub.texts).acquire_owned().await.map_err(gone)?;
+    let permit = Arc::clone(&hub.texts).acquire_owned().await.map_err(gone)?;
     let library = hub.library.clone();
-    let list = apart(move || library.list()).await?.map_err(of_library)?;
+    let list = apart(permit, move || library.list()).await?.map_err(of_library)?;
     Ok(json(&json!({"scenarios": list, "can_save": hub.library.can_save()})))
 }
 
@@ -166,7 +170,8 @@ async fn scenario(
         _ => return Err(refusal(StatusCode::NOT_FOUND, "scenarios are built-in or own")),
     };
     let library = hub.library.clone();
-    let text = apart(move || library.text(origin, &name)).await?.map_err(of_library)?;
+    let permit = Arc::clone(&hub.texts).acquire_owned().await.map_err(gone)?;
+    let text = apart(permit, move || library.text(origin, &name)).await?.map_err(of_library)?;
     Ok(text.into_response())
 }
 
@@ -184,11 +189,11 @@ async fn save(
             "built-in scenarios stay as they are: save under your own",
         ));
     }
-    let _permit = Arc::clone(&hub.texts).acquire_owned().await.map_err(gone)?;
+    let permit = Arc::clone(&hub.texts).acquire_owned().await.map_err(gone)?;
     let text = text(request, TEXT_BYTES_MAX).await?;
     let library = hub.library.clone();
     let saved = name.clone();
-    apart(move || library.save(&name, &text)).await?.map_err(of_library)?;
+    apart(permit, move || library.save(&name, &text)).await?.map_err(of_library)?;
     log::info!("{} saved the scenario {saved}", visitor.name);
     Ok(json(&json!({"saved": saved})))
 }
@@ -196,8 +201,8 @@ async fn save(
 async fn check(State(hub): State<Arc<Hub>>, Extension(ends): Extension<Ends>, request: Request) -> Answer {
     let _ = known(&hub, ends, request.headers())?;
     let text = text(request, TEXT_BYTES_MAX).await?;
-    let _permit = Arc::clone(&hub.texts).acquire_owned().await.map_err(gone)?;
-    Ok(json(&apart(move || library::check(&text)).await?))
+    let permit = Arc::clone(&hub.texts).acquire_owned().await.map_err(gone)?;
+    Ok(json(&apart(permit, move || library::check(&text)).await?))
 }
 
 async fn start(
@@ -214,7 +219,7 @@ async fn start(
     let day: DayTime = serde_json::from_value(day.into())
         .map_err(|_| refusal(StatusCode::NOT_FOUND, "a time of day is written, day, dusk or night"))?;
     let text = text(request, TEXT_BYTES_MAX).await?;
-    let _permit = Arc::clone(&hub.texts).acquire_owned().await.map_err(gone)?;
+    let permit = Arc::clone(&hub.texts).acquire_owned().await.map_err(gone)?;
     let origin = format!("{name}.toml");
     let named = origin.clone();
     let prepare = move || -> Result<(String, Option<String>), Refusal> {
@@ -222,7 +227,7 @@ async fn start(
         library::may_start(&text, &named).map_err(of_library)?;
         Ok((text, changed))
     };
-    let (text, changed) = apart(prepare).await??;
+    let (text, changed) = apart(permit, prepare).await??;
     // Control may have gone to somebody else meanwhile.
     hub.control.check(Some(&visitor)).map_err(forbidden)?;
     hub.begin(origin, text).map_err(|why| refusal(StatusCode::SERVICE_UNAVAILABLE, why))?;
@@ -264,8 +269,17 @@ async fn text(request: Request, bytes_max: usize) -> Result<String, Refusal> {
 }
 
 /// Does what may take a while without holding others up.
-async fn apart<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Refusal> {
-    let outcome = tokio::task::spawn_blocking(work).await;
+async fn apart<T: Send + 'static>(
+    permit: OwnedSemaphorePermit,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, Refusal> {
+    // The work goes on where whoever asked is gone, and so does what it counts as.
+    let counted = move || {
+        let done = work();
+        drop(permit);
+        done
+    };
+    let outcome = tokio::task::spawn_blocking(counted).await;
     outcome.map_err(|error| refusal(StatusCode::INTERNAL_SERVER_ERROR, format!("this went wrong: {error}")))
 }
 
@@ -298,7 +312,7 @@ fn gone<E>(_: E) -> Refusal {
 fn of_library(error: LibraryError) -> Refusal {
     let status = match &error {
         LibraryError::Name(_) | LibraryError::Unknown(_) => StatusCode::NOT_FOUND,
-        LibraryError::NoFolder => StatusCode::CONFLICT,
+        LibraryError::NoFolder | LibraryError::Full => StatusCode::CONFLICT,
         LibraryError::TooLong(_) => StatusCode::PAYLOAD_TOO_LARGE,
         LibraryError::Unsound(_) | LibraryError::Model { .. } => StatusCode::UNPROCESSABLE_ENTITY,
         LibraryError::Io { .. } => StatusCode::INTERNAL_SERVER_ERROR,

@@ -8,7 +8,7 @@
  * @typedef {{shot: number, fired_s: number, weight: string, words: string, boat: number | null, error_m: number[] | null,
  *   path: string}} CodedRound
  * @typedef {{time_s: number, weight: string, words: string, boat: number | null}} RunEvent
- * @typedef {{end_s: number, boats: Boat[], camera: Camera, keep_off_m: number, eye_height_m: number,
+ * @typedef {{end_s: number, boats: Boat[], camera: Camera, keep_off_m: number, eye_height_m: number, pauses: number[][],
  *   tracks: {time_s: string, camera: string, boats: string}, rounds: CodedRound[], events: RunEvent[], meshes: Record<string, CodedMesh>,
  *   video: import("./film.js").Coded | null}} PageData
  * @typedef {{position: number[], attitude: number[]}} Pose  Place (east, north, up) in metres; rotation to the world x, y, z, w.
@@ -110,6 +110,7 @@ export class Run {
     this.meshes = data.meshes;
     this.video = data.video;
     this.events = data.events;
+    this.pauses = data.pauses;
     this.rounds = data.rounds.map((coded) => new Round(coded));
     this.times = new Float64Array(decoded(data.tracks.time_s));
     this.cameras = new Float32Array(decoded(data.tracks.camera));
@@ -137,8 +138,10 @@ export class Run {
     const span = this.times[to] - this.times[from];
     const [before, after] = [time_s - this.times[from], this.times[to] - time_s];
     const isGap = span > GAP || span === 0;
-    if (isGap && Math.abs(before) > MOMENT && Math.abs(after) > MOMENT) return null;
-    const s = isGap ? (Math.abs(before) <= Math.abs(after) ? 0 : 1) : before / span;
+    // While the exercise stands still everything stays where it is.
+    const stands = isGap && this.pauses.some(([since, until]) => time_s > since - GAP && time_s < until + GAP && this.times[from] < until);
+    if (isGap && !stands && Math.abs(before) > MOMENT && Math.abs(after) > MOMENT) return null;
+    const s = stands ? 0 : isGap ? (Math.abs(before) <= Math.abs(after) ? 0 : 1) : before / span;
     /** @param {number} sample */
     const at = (sample) => (sample * count + which) * POSE;
     const [b, c] = [at(from), at(to)];

@@ -4,7 +4,10 @@ use std::{collections::BTreeMap, path::Path};
 
 use bowwave_core::{
     side::Side,
-    world::track::{RoundPath, TrackPose, TrackSample},
+    world::{
+        exercise::ExerciseFact,
+        track::{RoundPath, TrackPose, TrackSample},
+    },
 };
 use bowwave_record::{BoatDetails, CameraDetails, RunDetails};
 use serde::Serialize;
@@ -27,6 +30,8 @@ pub struct PageData<'a> {
     tracks: PageTracks,
     rounds: Vec<PageRound>,
     events: Vec<PageEvent>,
+    /// From when to when the exercise stood still.
+    pauses: Vec<[f64; 2]>,
     meshes: BTreeMap<&'a str, Mesh>,
     video: Option<PageVideo<'a>>,
 }
@@ -78,10 +83,28 @@ pub fn of<'a>(run: &'a ReviewedRun, video: Option<&'a RunVideo>) -> (PageData<'a
         tracks: tracks(run),
         rounds: rounds(run),
         events: events(run),
+        pauses: pauses(run),
         meshes,
         video: video.map(|video| video.for_page(run)),
     };
     (data, notes)
+}
+
+/// The times for which the exercise stood still: nothing moved then, and nothing was sampled.
+fn pauses(run: &ReviewedRun) -> Vec<[f64; 2]> {
+    let mut pauses = Vec::new();
+    let mut since = None;
+    for event in &run.scored.events {
+        match event.fact {
+            ExerciseFact::Paused => since = Some(run.seconds(event.time.ns())),
+            ExerciseFact::Resumed => {
+                pauses.extend(since.take().map(|since| [since, run.seconds(event.time.ns())]));
+            }
+            _ => {}
+        }
+    }
+    pauses.extend(since.map(|since| [since, run.seconds(run.end_ns())]));
+    pauses
 }
 
 fn tracks(run: &ReviewedRun) -> PageTracks {

@@ -174,11 +174,12 @@ impl Trainer {
             } else if asked_to_stop {
                 break;
             }
-            if let Some(instructor) = &mut instructor {
-                self.obey(instructor);
-            }
             if let Some(cause) = self.reload_cause() {
                 return Ok(Ended::Reload { lcd: self.source.lcd_size(), cause });
+            }
+            // What is ordered before another scenario is asked for is obeyed in this frame.
+            if let Some(instructor) = &mut instructor {
+                self.obey(instructor);
             }
             // Once more as a plain reference: the loop goes on with it.
             match self.frame(due, pulse, companion.as_mut().map(|c| &mut **c as &mut dyn Companion)) {
@@ -212,7 +213,10 @@ impl Trainer {
                     Some(why) => instructor.refuse(why),
                     None => self.events.push(Event::Order(InstructorOrder { time: now(), order })),
                 },
-                Request::Load(asked) => self.asked = Some(asked),
+                Request::Load(asked) => {
+                    self.asked = Some(asked);
+                    break;
+                }
             }
         }
         // What waits is known to wait with its first frame.

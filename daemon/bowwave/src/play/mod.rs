@@ -10,7 +10,7 @@ use bowwave_core::{
     session::Setup,
     text::toml::TEXT_BYTES_MAX,
     time::Time,
-    world::scenario::Scenario,
+    world::{exercise::ExerciseSpec, scenario::Scenario},
 };
 use bowwave_files::plain_text;
 use bowwave_trainer::{
@@ -80,14 +80,17 @@ pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
             port.prepare("ANOTHER SCENARIO BEGINS");
         }
         if let Ended::Reload { cause: ReloadCause::Asked(asked), .. } = &finished.ended {
-            let mut loaded = instructed::load(asked, &scenarios)?;
-            if asked.is_stand_by {
-                // A simulated sea goes on.
-                let (exercise, boats) = (loaded.scenario.exercise, Vec::new());
-                loaded.scenario = Scenario { boats, exercise, weapon: loaded.scenario.weapon, ..scenario };
-            }
-            let (text, base) = (asked.text.clone(), scenarios.clone());
-            playing = Playing { loaded, text, base, is_stand_by: asked.is_stand_by };
+            let (loaded, is_stand_by) = match instructed::load(asked, &scenarios) {
+                Ok(loaded) if !asked.is_stand_by => (loaded, false),
+                Ok(loaded) => (stand_by(loaded.scenario, scenario), true),
+                // It was sound as it was asked for, but files change.
+                Err(why) => {
+                    port.iter().for_each(|port| port.refuse(format!("{why:#}")));
+                    let empty = Scenario { name: "Stand by".to_owned(), ..scenario.clone() };
+                    (stand_by(Scenario { exercise: ExerciseSpec::default(), ..empty }, scenario), true)
+                }
+            };
+            playing = Playing { loaded, text: asked.text.clone(), base: scenarios.clone(), is_stand_by };
             continue;
         }
         let outcome = desk::report(finished, desk_args)?;
@@ -97,6 +100,13 @@ pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
         }
         return Ok(outcome);
     }
+}
+
+/// What is shown between exercises: nobody on the sea of the one before, which goes on.
+fn stand_by(empty: Scenario, before: Scenario) -> LoadedScenario {
+    let Scenario { name, exercise, weapon, .. } = empty;
+    let scenario = Scenario { name, exercise, weapon, boats: Vec::new(), duration_s: None, ..before };
+    LoadedScenario { scenario, models: Vec::new(), of_boats: Vec::new() }
 }
 
 /// A scenario that is played.

@@ -59,15 +59,11 @@ pub fn run(arguments: &RunArgs, program_start: Time) -> Result<Outcome> {
     let state = env::var_os("STATE_DIRECTORY").map(PathBuf::from);
     let last_good = arguments.data.clone().or(state.clone()).map(|d| d.join("last-good"));
     let mut reader = Reader::new(arguments.config.clone(), last_good);
+    (reader.data, reader.state) = (arguments.data.clone(), state);
     let mut instructor = None;
     loop {
         let mut settings = reader.read()?;
-        let data = arguments
-            .data
-            .clone()
-            .or_else(|| settings.config.files.data.clone())
-            .or_else(|| state.clone())
-            .unwrap_or_else(|| Path::new(DATA).into());
+        let data = reader.data(&settings.config);
         if let Err(e) = std::fs::create_dir_all(&data) {
             // Hits are kept in memory then, and the LCD says so.
             log::error!("cannot make the data folder {}: {e}; name another in files.data", data.display());
@@ -133,7 +129,7 @@ fn join_instructor(joined: &mut Option<Joined>, settings: &mut Settings, data: &
     // The path may be the same one.
     *joined = None;
     let Some(socket) = &wanted.socket else { return };
-    match instructed::listen(socket, instructed::scenarios(&settings.config, Some(data)), |_| Ok(())) {
+    match instructed::listen(socket, instructed::scenarios(&settings.config, data), |_| Ok(())) {
         Ok(port) => {
             port.prepare("THE TRAINER STARTS");
             *joined = Some(Joined { settings: wanted.clone(), port });

@@ -26,6 +26,7 @@ use bowwave_files::plain_text;
 use bowwave_trainer::instructor::AskedScenario;
 use glam::{DQuat, DVec2, DVec3};
 
+use super::DATA;
 use crate::{
     config::{self, Config},
     instructed,
@@ -67,6 +68,10 @@ pub struct Reader {
     pub last_good: Option<PathBuf>,
     /// The scenario that the instructor asked for, in the configured one's place.
     pub asked: Option<AskedScenario>,
+    /// The data folder that the command line names.
+    pub data: Option<PathBuf>,
+    /// The service's own folder.
+    pub state: Option<PathBuf>,
     /// The files that were named do not answer: a mount hangs.
     is_silent: bool,
 }
@@ -81,7 +86,13 @@ struct Accepted<T> {
 impl Reader {
     /// For that configuration.
     pub const fn new(config: PathBuf, last_good: Option<PathBuf>) -> Self {
-        Self { config, last_good, asked: None, is_silent: false }
+        Self { config, last_good, asked: None, data: None, state: None, is_silent: false }
+    }
+
+    /// The folder for hits, recordings and scenarios under that configuration.
+    pub fn data(&self, config: &Config) -> PathBuf {
+        let named = self.data.as_ref().or(config.files.data.as_ref()).or(self.state.as_ref());
+        named.cloned().unwrap_or_else(|| Path::new(DATA).into())
     }
 
     /// Reads everything. Fails only where not even what is built in works. A mount that hangs, as of a stick that was pulled, holds nobody
@@ -197,7 +208,7 @@ impl Reader {
             Ok((scenario, text.to_owned(), models, of_boats, base.to_owned()))
         };
         if let Some(asked) = &self.asked {
-            let base = instructed::scenarios(config, self.last_good.as_deref().and_then(Path::parent));
+            let base = instructed::scenarios(config, &self.data(config));
             // It was checked as it was asked for, but files change.
             match instructed::load(asked, &base) {
                 Ok(LoadedScenario { scenario, models, of_boats }) => {

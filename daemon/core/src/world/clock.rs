@@ -32,6 +32,11 @@ impl ExerciseClock {
         self.stands_since.is_some()
     }
 
+    /// Tests whether it has ever stood still.
+    pub const fn has_paused(&self) -> bool {
+        !self.pauses.is_empty() || self.is_paused()
+    }
+
     /// Stands still from `at` on, or from where it was followed to already. Gives that time of the host; `None` where it stood before.
     pub fn pause(&mut self, at: Time) -> Option<Time> {
         if self.is_paused() || self.pauses.len() >= PAUSES_MAX {
@@ -67,10 +72,18 @@ impl ExerciseClock {
         host.max(pause.until).plus_ns(-pause.total_ns)
     }
 
-    /// The host's time at a time of the exercise: the beginning of a pause at whose time it stood, or now while it stands.
+    /// Tests whether the exercise stands, or stood, at a time of the host.
+    pub fn stands_at(&self, host: Time) -> bool {
+        let began = self.pauses.partition_point(|pause| pause.from <= host);
+        let last = began.checked_sub(1).and_then(|last| self.pauses.get(last));
+        self.stands_since.is_some_and(|since| host >= since) || last.is_some_and(|pause| host < pause.until)
+    }
+
+    /// The host's time at a time of the exercise: now while it stands, and the end of a pause at whose time it stood.
     pub fn to_host(&self, exercise: Time) -> Time {
-        // A pause lies at the exercise's time at which it began.
-        let before = self.pauses.partition_point(|pause| pause.until.plus_ns(-pause.total_ns) < exercise);
+        // A pause lies at the exercise's time at which it began. What is of that very time and comes afterwards belongs behind it: until the next
+        // picture the exercise is not followed any further.
+        let before = self.pauses.partition_point(|pause| pause.until.plus_ns(-pause.total_ns) <= exercise);
         let shift = before.checked_sub(1).and_then(|last| self.pauses.get(last)).map_or(0, |p| p.total_ns);
         let host = exercise.plus_ns(shift);
         match (self.stands_since, self.newest) {
@@ -104,7 +117,10 @@ mod tests {
         assert_eq!((clock.resume(at(2000)), clock.resume(at(2100))), (Some(at(2000)), None));
         assert_eq!(clock.of_host(at(2500)), at(1500));
         assert_eq!(clock.of_host(at(1200)), at(1000));
-        assert_eq!((clock.to_host(at(1500)), clock.to_host(at(1000))), (at(2500), at(1000)));
+        assert_eq!((clock.to_host(at(1500)), clock.to_host(at(1000))), (at(2500), at(2000)));
+        assert_eq!(clock.to_host(at(999)), at(999));
+        let stands = [999, 1000, 1999, 2000].map(|ms| clock.stands_at(at(ms)));
+        assert_eq!(stands, [false, true, true, false]);
     }
 
     #[test]

@@ -268,6 +268,7 @@ impl Fleet {
             let Some(behaviour) = boat.waiting.take() else { continue };
             let to = at.map_or(middle, |at| place(at.bearing_deg.to_radians(), at.range_m));
             boat.history.restart(behaviour.moved(middle, to).begun_at(seconds));
+            boat.burns_at_s = boat.burns_at_s.map(|after_s| after_s + seconds);
         }
         joining
     }

@@ -252,7 +252,10 @@ impl World {
 
     /// Takes in an edge of the trigger.
     pub fn trigger(&mut self, edge: TriggerEdge) {
-        self.weapon.edge(TriggerEdge { time: self.clock.of_host(edge.time), ..edge });
+        // Who presses in a pause presses again after it.
+        if !edge.pressed || !self.clock.stands_at(edge.time) {
+            self.weapon.edge(TriggerEdge { time: self.clock.of_host(edge.time), ..edge });
+        }
     }
 
     /// Takes in place and time that the ship's instruments told.
@@ -280,7 +283,7 @@ impl World {
 
     /// Arms or disarms the weapon.
     pub fn arm(&mut self, armed: bool) {
-        self.weapon.arm(armed && !self.clock.is_paused());
+        self.weapon.arm(armed);
     }
 
     /// Fires what the trigger asks for up to `known` and follows boats and rounds up to `until`, or as far as they were followed
@@ -346,7 +349,12 @@ impl World {
         running.rounds.advance(now, running.start, &mut running.fleet, records);
         running.now = now;
         let sampler = self.sampler.get_or_insert(TrackSampler::new(running.start));
-        sampler.sample(now, &running.fleet, &mut self.tracks.samples);
+        if self.clock.is_paused() {
+            // While the camera's pose then is still known.
+            sampler.finish(now, &running.fleet, &mut self.tracks.samples);
+        } else {
+            sampler.sample(now, &running.fleet, &mut self.tracks.samples);
+        }
         self.tracks.rounds.extend(running.rounds.take_paths());
         if self.weapon.state() == WeaponState::Stoppage && !was_stopped {
             self.events.push(ExerciseEvent { time: now, fact: ExerciseFact::Stoppage });

@@ -109,10 +109,12 @@ fn connect_for_reading(path: &Path) -> rusqlite::Result<(Connection, (i64, i64))
     };
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     open(path, flags).or_else(|error: rusqlite::Error| {
-        // Reading needs a file for its locks beside the database. Where none can be made nobody can write either, so that
-        // reading without locks is safe, unless a log holds what the database does not have yet.
+        // Reading needs a file for its locks beside the database, which not everybody may make who may read. While there is no log nobody writes: a
+        // trainer that begins to, as another user, writes to its log first, and who reads is done long before that goes into the database.
         let log_bytes = fs::metadata(with_suffix(path, "-wal")).map_or(0, |status| status.len());
-        if error.sqlite_error_code() != Some(ErrorCode::CannotOpen) || log_bytes > 0 {
+        let has_no_locks =
+            matches!(error.sqlite_error_code(), Some(ErrorCode::CannotOpen | ErrorCode::ReadOnly));
+        if !has_no_locks || log_bytes > 0 {
             return Err(error);
         }
         open(&immutable_uri(path), flags | OpenFlags::SQLITE_OPEN_URI)

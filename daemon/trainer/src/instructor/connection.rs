@@ -216,31 +216,48 @@ impl Reader {
             ToDaemon::Act { act } => Request::Act(act),
             ToDaemon::Load { origin, scenario } => {
                 let origin = bowwave_core::text::one_line(&origin);
-                let asked = AskedScenario { origin, text: scenario, is_stand_by: false };
-                match self.checked(asked) {
-                    Ok(asked) => Request::Load(asked),
-                    Err(why) => return self.serving.mail.refuse(why),
-                }
+                return self.check(AskedScenario { origin, text: scenario, is_stand_by: false });
             }
-            ToDaemon::StandBy => match self.checked(stand_by()) {
-                Ok(asked) => Request::Load(asked),
-                Err(why) => return self.serving.mail.refuse(why),
-            },
+            ToDaemon::StandBy => return self.check(stand_by()),
         };
-        match self.serving.requests.try_send(request) {
+        self.serving.ask(request);
+    }
+
+    /// Has a scenario checked, which may take minutes, and then asked for. Whatever else is asked for goes on meanwhile.
+    fn check(&self, asked: AskedScenario) {
+        let mail = &self.serving.mail;
+        let Some(check) = self.serving.check.clone() else {
+            return mail
+                .refuse("this trainer plays one recording or scenario: start it with another".to_owned());
+        };
+        if self.serving.checks.swap(true, Ordering::AcqRel) {
+            return mail.refuse("a scenario is being made ready already: wait for it".to_owned());
+        }
+        let serving = self.serving.clone();
+        let checked = thread::Builder::new().name("instructor-check".to_owned()).spawn(move || {
+            match check(&asked) {
+                Ok(()) => serving.ask(Request::Load(asked)),
+                Err(why) => serving.mail.refuse(why),
+            }
+            serving.checks.store(false, Ordering::Release);
+        });
+        if let Err(e) = checked {
+            self.serving.checks.store(false, Ordering::Release);
+            mail.refuse(format!("the scenario could not be checked: {e}"));
+        }
+    }
+}
+
+impl Serving {
+    /// Hands a request to the loop, where there is room for it.
+    fn ask(&self, request: Request) {
+        match self.requests.try_send(request) {
             Ok(()) => {}
             Err(TrySendError::Full(_)) => {
-                self.serving.mail.refuse("too much was asked for at once: ask again in a moment".to_owned());
+                self.mail.refuse("too much was asked for at once: ask again in a moment".to_owned());
             }
             Err(TrySendError::Disconnected(_)) => {}
         }
-    }
-
-    fn checked(&self, asked: AskedScenario) -> Result<AskedScenario, String> {
-        let Some(check) = &self.serving.check else {
-            return Err("this trainer plays one recording or scenario: start it with another".to_owned());
-        };
-        check(&asked).map(|()| asked)
     }
 }
 

@@ -10,6 +10,7 @@ mod status;
 mod tap;
 
 use std::{
+    cell::Cell,
     path::{Path, PathBuf},
     sync::{
         Arc,
@@ -81,6 +82,8 @@ pub struct InstructorPort {
     thread: Option<JoinHandle<()>>,
     can_load: bool,
     told: Option<Time>,
+    /// What is prepared stands for a status.
+    prepares: Cell<bool>,
     session: u64,
     is_stand_by: bool,
     journal: Option<String>,
@@ -101,6 +104,7 @@ impl InstructorPort {
             requests: sender,
             mail: Arc::clone(&mail),
             tap: Arc::clone(&tap),
+            checks: Arc::default(),
             check: options.check,
         };
         let stopping = Arc::clone(&stop);
@@ -116,6 +120,7 @@ impl InstructorPort {
             thread: Some(thread),
             can_load,
             told: None,
+            prepares: Cell::new(false),
             session: 0,
             is_stand_by: false,
             journal: None,
@@ -126,14 +131,20 @@ impl InstructorPort {
     pub fn prepare(&self, what: &str) {
         let word = "GETTING READY".to_owned();
         let can_load = false;
+        self.prepares.set(true);
         self.mail.put_preparing(Some(Status { word, cause: what.to_owned(), can_load, ..Status::default() }));
     }
 
-    /// Another session begins. Its rounds go to that journal.
+    /// Another session begins. Its rounds go to that journal. What was asked for meanwhile was meant for the one before.
     pub fn begin_session(&mut self, journal: Option<&Path>, is_stand_by: bool) {
+        if self.requests().count() > 0 {
+            self.refuse("what was asked for while the scenario began is not done: ask again");
+        }
         self.session += 1;
         self.is_stand_by = is_stand_by;
-        self.journal = journal.map(|path| path.display().to_string());
+        // The instructor's process runs in another folder.
+        let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        self.journal = journal.map(|path| whole(path).display().to_string());
         self.told = None;
     }
 
@@ -159,7 +170,9 @@ impl InstructorPort {
             return;
         }
         self.told = Some(now);
-        self.mail.put_preparing(None);
+        if self.prepares.take() {
+            self.mail.put_preparing(None);
+        }
         self.mail.put_status(Status {
             session: self.session,
             stands_by: self.is_stand_by,
@@ -189,6 +202,8 @@ struct Serving {
     mail: Arc<Mail>,
     tap: Arc<PictureTap>,
     check: Option<CheckScenario>,
+    /// A scenario is being checked.
+    checks: Arc<AtomicBool>,
 }
 
 #[cfg(test)]

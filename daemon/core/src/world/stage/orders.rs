@@ -27,6 +27,8 @@ impl World {
             }
             Order::Resume => {
                 let time = self.clock.resume(order.time);
+                // A trigger that was held all the time fires at the next press.
+                self.weapon.arm(false);
                 self.pauses.extend(time.map(|time| ExerciseEvent { time, fact: ExerciseFact::Resumed }));
             }
             Order::Join { boat, at } => {
@@ -89,7 +91,17 @@ impl World {
         self.events.splice(0..0, self.pauses.drain(..));
         let host_ns = |ns: &mut i64| *ns = clock.to_host(Time::from_ns(*ns)).ns();
         self.tracks.samples.iter_mut().for_each(|sample| host_ns(&mut sample.time_ns));
-        self.tracks.rounds.iter_mut().for_each(|round| host_ns(&mut round.fired_ns));
+        for round in &mut self.tracks.rounds {
+            let fired = Time::from_ns(round.fired_ns);
+            let fired_host = clock.to_host(fired);
+            if clock.has_paused() {
+                for point in &mut round.points {
+                    let at = clock.to_host(fired.plus_secs(f64::from(point.after_s)));
+                    point.after_s = at.secs_since(fired_host) as f32;
+                }
+            }
+            round.fired_ns = fired_host.ns();
+        }
     }
 
     /// The clock of the exercise, which stands while it is paused.
