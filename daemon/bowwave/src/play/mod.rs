@@ -60,7 +60,7 @@ pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
     let config = desk::config(desk_args)?;
     let scenarios = config.instructor.scenarios.clone().unwrap_or(base);
     let camera = arguments.camera;
-    let sea = move |scenario: &Scenario| sea_of(scenario, camera).map(drop);
+    let sea = move |scenario: &Scenario| cache::panorama(&recipe_of(scenario, camera)?).map(drop);
     let listen = |socket: &PathBuf| instructed::listen(socket, scenarios.clone(), sea);
     let mut port = arguments.instructor.as_ref().map(listen).transpose()?;
     // Making a sea is ended at once by an interrupt, so these are caught once the first one is made.
@@ -117,13 +117,12 @@ struct Playing {
     is_stand_by: bool,
 }
 
-/// The sea of a scenario for such a camera, made now where it is not there yet.
-fn sea_of(scenario: &Scenario, camera: (u32, u32)) -> Result<(PanoramaRecipe, PathBuf)> {
+/// The recipe of a scenario's sea for such a camera.
+fn recipe_of(scenario: &Scenario, camera: (u32, u32)) -> Result<PanoramaRecipe> {
     let recipe = PanoramaRecipe::of_scenario(scenario, camera);
     let drawable = "the sea of this scenario cannot be drawn: change mount.eye_height_m or sea.beaufort in it, or give another --camera";
     recipe.check().context(drawable)?;
-    let panorama = cache::panorama(&recipe)?;
-    Ok((recipe, panorama))
+    Ok(recipe)
 }
 
 /// What does not change from one scenario to the next.
@@ -146,7 +145,7 @@ impl PlayerSeat<'_> {
         let desk_args = &arguments.desk;
         let Playing { mut loaded, text, base, .. } = playing;
         // The sea is the scenario's, whatever the seed of its chance.
-        let (recipe, panorama) = sea_of(&loaded.scenario, arguments.camera)?;
+        let recipe = recipe_of(&loaded.scenario, arguments.camera)?;
         if let Some(seed) = desk_args.seed {
             loaded.scenario.seed = seed;
         }
@@ -157,6 +156,7 @@ impl PlayerSeat<'_> {
             || if instruction.is_some() { u64::MAX } else { desk::frames_of(desk::length_s(scenario)) };
         let frames = asked.unwrap_or_else(length);
         desk::check(desk_args, frames)?;
+        let panorama = cache::panorama(&recipe)?;
         if interrupts.is_none() {
             *interrupts = Some(desk::catch_interrupts()?);
         }
