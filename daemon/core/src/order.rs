@@ -47,7 +47,7 @@ pub enum Order {
     Resume,
 }
 
-/// Where a boat joins, from the gun.
+/// Place from the gun at which a boat joins.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JoinPlace {
     /// Clockwise from true north, degrees.
@@ -86,7 +86,7 @@ impl Order {
     /// Checks lengths and numbers.
     ///
     /// # Errors
-    /// Where a text or a place is none.
+    /// A text that is none, or a place that is none, is refused.
     pub fn check(&self) -> Result<(), OrderError> {
         match self {
             // The LCD's letters are those of ASCII.

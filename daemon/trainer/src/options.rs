@@ -15,7 +15,7 @@ use crate::{
 pub struct Signals {
     /// End.
     pub stop: AtomicBool,
-    /// Read the settings anew.
+    /// Read the settings again.
     pub reload: AtomicBool,
     /// The gun stands at its stow.
     pub rezero: AtomicBool,
@@ -26,7 +26,7 @@ pub struct Signals {
 pub enum Ended {
     /// It was asked to, or has drawn all frames.
     Stopped,
-    /// The settings are to be read anew, the LCD has another size now, or the instructor asked for another scenario.
+    /// The settings are to be read again, the LCD has another size now, or the instructor asked for another scenario.
     Reload {
         /// Size of the LCD at that time: one that is slow to start is not waited for again.
         lcd: Option<(u32, u32)>,

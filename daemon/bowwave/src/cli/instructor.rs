@@ -37,7 +37,7 @@ pub struct InstructorArgs {
     /// Let whoever opens the page steer the trainer as long as there is no token
     #[arg(long)]
     pub without_token: bool,
-    /// Where tokens are kept
+    /// File of tokens
     #[command(flatten)]
     pub tokens: TokenArgs,
     /// Folder of the instructor's own scenarios, which the page can write to
@@ -88,7 +88,7 @@ pub enum TokenCommand {
 pub struct NamedToken {
     /// Whose it is, as everybody at the page sees it
     pub name: String,
-    /// Where it is kept
+    /// File of tokens
     #[command(flatten)]
     pub tokens: TokenArgs,
 }

@@ -102,7 +102,7 @@ pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
     }
 }
 
-/// What is shown between exercises: nobody on the sea of the one before, which goes on.
+/// The scenario between exercises: nobody on the sea of the one before, which goes on.
 fn stand_by(empty: Scenario, before: Scenario) -> LoadedScenario {
     let Scenario { name, exercise, weapon, .. } = empty;
     let scenario = Scenario { name, exercise, weapon, boats: Vec::new(), duration_s: None, ..before };
@@ -125,7 +125,7 @@ fn recipe_of(scenario: &Scenario, camera: (u32, u32)) -> Result<PanoramaRecipe> 
     Ok(recipe)
 }
 
-/// What does not change from one scenario to the next.
+/// Arguments and settings that all scenarios of a run share.
 struct PlayerSeat<'a> {
     arguments: &'a Play,
     aimer: Aimer,

@@ -9,7 +9,7 @@ pub enum DevicePart {
     Camera,
     /// The inertial unit.
     Imu,
-    /// How picture and unit agree.
+    /// Agreement of picture and unit.
     Registration,
     /// The feed of the ship's instruments.
     Ship,

@@ -18,7 +18,7 @@ use crate::{
             Orders, RoundStrike, Signals, StepView, Traffic, step_after, step_seconds,
         },
         contact::Capsule,
-        exercise::group_of,
+        exercise::is_called,
         flare::Flare,
         scenario::{BoatSpec, Scenario, Side, place},
         searchlight::{Beam, Searchlight},
@@ -259,7 +259,7 @@ impl Fleet {
     /// not been followed that far. Gives those that joined.
     pub fn join(&mut self, name: &str, at: Option<JoinPlace>, time: Time) -> Vec<usize> {
         let seconds = time.secs_since(self.start);
-        let is_meant = |b: &FleetBoat| b.waiting.is_some() && (b.name == name || group_of(&b.name) == name);
+        let is_meant = |b: &FleetBoat| b.waiting.is_some() && is_called(&b.name, name);
         let joining: Vec<usize> = (0..self.boats.len()).filter(|i| is_meant(&self.boats[*i])).collect();
         let starts = joining.iter().filter_map(|i| self.boats[*i].waiting.as_ref());
         let middle = starts.map(|b| b.begin().position).sum::<DVec2>() / joining.len().max(1) as f64;
@@ -275,7 +275,7 @@ impl Fleet {
 
     /// Why a boat, or a group, of that name cannot join, or not elsewhere than the scenario says; `None` where it can.
     pub fn refuses(&self, name: &str, is_elsewhere: bool) -> Option<String> {
-        let known = |b: &&FleetBoat| b.name == name || group_of(&b.name) == name;
+        let known = |b: &&FleetBoat| is_called(&b.name, name);
         let mut waiting = self.boats.iter().filter(known).filter_map(|b| b.waiting.as_ref()).peekable();
         if waiting.peek().is_none() {
             let why = if self.boats.iter().any(|b| known(&b)) {

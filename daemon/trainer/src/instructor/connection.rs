@@ -44,7 +44,7 @@ pub(super) struct Mail {
 #[derive(Debug, Default)]
 struct Waiting {
     status: Option<Box<Status>>,
-    /// Stands for a status each second while the loop does not run.
+    /// Stands for a status twice a second while the loop does not run.
     preparing: Option<Box<Status>>,
     refusals: VecDeque<String>,
     pictures: bool,

@@ -8,5 +8,6 @@ mod watch;
 pub use event::{ExerciseEvent, ExerciseFact};
 pub use spec::{
     About, CallSpec, Engagement, ExerciseSpec, Goals, Happening, HappeningCause, HappeningEffect, group_of,
+    is_called,
 };
 pub use watch::{ExerciseWatch, STOPPED_M_S, WatchedBoat, pointed_at};

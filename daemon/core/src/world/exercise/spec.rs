@@ -58,6 +58,11 @@ pub fn group_of(boat: &str) -> &str {
     }
 }
 
+/// Tests whether a name is that of a boat, or of the group that it is one of.
+pub fn is_called(boat: &str, name: &str) -> bool {
+    boat == name || group_of(boat) == name
+}
+
 /// Boats that something is about.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum About {
@@ -72,7 +77,7 @@ impl About {
     pub fn covers(&self, boat: &str, side: Side) -> bool {
         match self {
             Self::Side(about) => *about == side,
-            Self::Name(name) => boat == name || group_of(boat) == name,
+            Self::Name(name) => is_called(boat, name),
         }
     }
 }

@@ -196,7 +196,7 @@ impl ExerciseWatch {
         orders
     }
 
-    /// What the instructor ordered happens.
+    /// Obeys the instructor's orders.
     fn obey(&mut self, time: Time, orders: &mut WatchOrders, events: &mut Vec<ExerciseEvent>) {
         for order in std::mem::take(&mut self.orders) {
             let fact = match order {
